@@ -1,0 +1,7 @@
+//! meshmill: recipes that turn any triangle mesh into a finite-element surface mesh, run as a cached graph.
+
+pub mod mesh;
+pub mod metric;
+pub mod step;
+pub mod steps;
+pub mod watch;

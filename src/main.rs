@@ -1,0 +1,3 @@
+//! The `meshmill` command.
+
+fn main() {}

@@ -1,0 +1,11 @@
+//! Plain mesh data and the kernel that edits it. Knows nothing of files, recipes or steps.
+
+pub mod carried;
+pub mod id;
+pub mod soup;
+pub mod surface;
+
+pub use carried::{Carried, EdgeKey, EdgeMark, Field, Freedom, Groups, MarkCause, Regions, SeamId, Support, edge_key};
+pub use id::{EdgeId, FaceId, HalfedgeId, Id, IdVec, VertexId};
+pub use soup::{Facet, Soup};
+pub use surface::Surface;

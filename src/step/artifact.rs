@@ -1,0 +1,94 @@
+//! What flows between steps: shared, immutable values with a port type each.
+
+use std::fmt;
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+
+use super::failure::StepFailure;
+use crate::mesh::{Soup, Surface};
+use crate::metric::Measurement;
+
+/// The type of an input or output, checked before anything runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Port {
+    /// The bytes of a file.
+    File,
+    /// Triangles and quads of any topology, as read.
+    Soup,
+    /// An oriented 2-manifold triangle mesh, perhaps with boundary.
+    Surface,
+    /// A table of metrics.
+    Metrics,
+}
+
+impl fmt::Display for Port {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::File => "file",
+            Self::Soup => "soup",
+            Self::Surface => "surface",
+            Self::Metrics => "metrics",
+        })
+    }
+}
+
+/// A file as a step sees it: its bytes and how it was called. Paths never reach a step.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct FileBytes {
+    /// File name without folders; its ending tells the format, the rest serves error messages only.
+    pub name: String,
+    /// The content.
+    pub bytes: Vec<u8>,
+}
+
+/// A value between steps. Cloning shares it.
+#[derive(Clone, Debug)]
+pub enum Artifact {
+    /// See [`Port::File`].
+    File(Arc<FileBytes>),
+    /// See [`Port::Soup`].
+    Soup(Arc<Soup>),
+    /// See [`Port::Surface`].
+    Surface(Arc<Surface>),
+    /// See [`Port::Metrics`].
+    Metrics(Arc<Measurement>),
+}
+
+impl Artifact {
+    /// Its port type.
+    pub fn port(&self) -> Port {
+        match self {
+            Self::File(_) => Port::File,
+            Self::Soup(_) => Port::Soup,
+            Self::Surface(_) => Port::Surface,
+            Self::Metrics(_) => Port::Metrics,
+        }
+    }
+
+    /// The surface, or a failure that names the port found.
+    pub fn as_surface(&self) -> Result<&Arc<Surface>, StepFailure> {
+        match self {
+            Self::Surface(surface) => Ok(surface),
+            other => Err(StepFailure::bad_input(format!("expected a surface, got a {}", other.port()))),
+        }
+    }
+
+    /// The soup, or a failure that names the port found.
+    pub fn as_soup(&self) -> Result<&Arc<Soup>, StepFailure> {
+        match self {
+            Self::Soup(soup) => Ok(soup),
+            other => Err(StepFailure::bad_input(format!("expected a soup, got a {}", other.port()))),
+        }
+    }
+
+    /// Any mesh as a soup, for writers and metrics; `None` for files and metrics.
+    pub fn to_soup(&self) -> Option<Arc<Soup>> {
+        match self {
+            Self::Soup(soup) => Some(Arc::clone(soup)),
+            Self::Surface(surface) => Some(Arc::new(surface.to_soup())),
+            Self::File(_) | Self::Metrics(_) => None,
+        }
+    }
+}
