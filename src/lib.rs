@@ -2,6 +2,7 @@
 
 pub mod mesh;
 pub mod metric;
+pub mod plan;
 pub mod step;
 pub mod steps;
 pub mod watch;
