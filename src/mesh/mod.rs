@@ -1,7 +1,10 @@
 //! Plain mesh data and the kernel that edits it. Knows nothing of files, recipes or steps.
 
+pub mod bvh;
 pub mod carried;
+pub mod geometry;
 pub mod id;
+pub mod predicate;
 pub mod soup;
 pub mod surface;
 
