@@ -5,4 +5,5 @@ pub mod metric;
 pub mod plan;
 pub mod step;
 pub mod steps;
+pub mod store;
 pub mod watch;

@@ -1,0 +1,176 @@
+//! What the store promises: nothing partial, damage is a miss, cleaning never costs a wrong result.
+
+use std::sync::Arc;
+
+use super::*;
+use crate::step::FileBytes;
+
+fn artifact(bytes: &[u8]) -> Artifact {
+    Artifact::File(Arc::new(FileBytes { name: "part.stl".into(), bytes: bytes.to_vec() }))
+}
+
+fn entry(saved: Saved) -> Entry {
+    Entry {
+        version: "0".into(),
+        task: "part/fe".into(),
+        record: vec![("parameter size".into(), "2%".into())],
+        outcome: Outcome::Artifact { content: saved.content, bytes: saved.bytes, figures: Figures::default() },
+        stats: serde_json::json!({ "rounds": 3, "worst": 0.1 }),
+        seconds: 0.5,
+    }
+}
+
+fn store() -> (tempfile::TempDir, Store) {
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open(folder.path()).unwrap();
+    (folder, store)
+}
+
+fn fill(store: &Store, count: u8) -> Vec<(Hash, Saved)> {
+    let one = |i: u8| {
+        let saved = store.save(&artifact(&[i; 100])).unwrap();
+        let key = blake3::hash(&[i]);
+        store.publish(&key, &entry(saved)).unwrap();
+        (key, saved)
+    };
+    (0..count).map(one).collect()
+}
+
+fn age(path: &Path, seconds: u64) {
+    let file = fs::File::options().append(true).open(path).unwrap();
+    file.set_modified(SystemTime::now() - Duration::from_secs(seconds)).unwrap();
+}
+
+#[test]
+fn what_was_published_is_found_again() {
+    let (_folder, store) = store();
+    let (key, saved) = fill(&store, 1)[0];
+    assert_eq!(store.entry(&key), Some(entry(saved)));
+    assert_eq!(store.newest("part/fe").unwrap().0, key);
+    let Some(Artifact::File(file)) = store.load(&saved.content) else { panic!("a file was saved") };
+    assert_eq!(file.bytes, [0; 100]);
+    assert_eq!(store.stat().unwrap().leftovers, 0);
+}
+
+#[test]
+fn a_damaged_blob_is_a_miss_and_can_be_saved_again() {
+    let (_folder, store) = store();
+    let (_, saved) = fill(&store, 1)[0];
+    let path = store.place("cas", &saved.content);
+    let mut bytes = fs::read(&path).unwrap();
+    let last = bytes.len() - 1;
+    bytes[last] ^= 1;
+    fs::write(&path, bytes).unwrap();
+    assert!(store.load(&saved.content).is_none());
+    store.save(&artifact(&[0; 100])).unwrap();
+    assert!(store.load(&saved.content).is_some());
+}
+
+#[test]
+fn a_damaged_entry_is_a_miss() {
+    let (_folder, store) = store();
+    let (key, _) = fill(&store, 1)[0];
+    let path = store.place("ac", &key);
+    let bytes = fs::read(&path).unwrap();
+    for len in [0, 10, bytes.len() - 1] {
+        fs::write(&path, &bytes[..len]).unwrap();
+        assert_eq!(store.entry(&key), None);
+    }
+}
+
+#[test]
+fn gc_removes_what_was_not_used_for_long() {
+    let (_folder, store) = store();
+    let items = fill(&store, 3);
+    age(&store.place("ac", &items[1].0), 1000);
+    let limits = GcLimits { max_age: Some(Duration::from_secs(500)), ..GcLimits::default() };
+    let dry = store.gc(GcLimits { dry_run: true, ..limits }).unwrap();
+    assert!(store.entry(&items[1].0).is_some());
+    let report = store.gc(limits).unwrap();
+    assert_eq!((report.entries, report.blobs), (1, 1));
+    assert_eq!(dry, report);
+    assert!(store.entry(&items[1].0).is_none());
+    assert!(store.load(&items[1].1.content).is_none());
+    assert!(store.load(&items[0].1.content).is_some());
+}
+
+#[test]
+fn gc_by_size_keeps_a_blob_that_a_younger_entry_names() {
+    let (_folder, store) = store();
+    let items = fill(&store, 2);
+    let shared = blake3::hash(b"second key of the first content");
+    store.publish(&shared, &entry(items[0].1)).unwrap();
+    age(&store.place("ac", &items[0].0), 3000);
+    let total = store.stat().unwrap().bytes;
+    let report = store.gc(GcLimits { max_bytes: Some(total - 1), ..GcLimits::default() }).unwrap();
+    assert_eq!((report.entries, report.blobs), (1, 0));
+    assert!(store.load(&items[0].1.content).is_some());
+    store.gc(GcLimits { max_bytes: Some(0), ..GcLimits::default() }).unwrap();
+    assert_eq!(store.stat().unwrap(), StoreStat::default());
+}
+
+#[test]
+fn gc_leaves_a_young_blob_without_entry_alone() {
+    let (_folder, store) = store();
+    let saved = store.save(&artifact(b"on the way")).unwrap();
+    store.gc(GcLimits::default()).unwrap();
+    assert!(store.load(&saved.content).is_some());
+    age(&store.place("cas", &saved.content), 2 * 60 * 60);
+    assert_eq!(store.gc(GcLimits::default()).unwrap().blobs, 1);
+}
+
+#[test]
+fn verify_names_and_removes_what_is_damaged() {
+    let (_folder, store) = store();
+    let items = fill(&store, 2);
+    let path = store.place("cas", &items[0].1.content);
+    fs::write(&path, b"nonsense").unwrap();
+    assert_eq!(store.verify().unwrap().damaged, [path]);
+    assert_eq!(store.verify().unwrap(), CleanReport::default());
+}
+
+#[test]
+fn clear_empties_a_cache_and_refuses_other_folders() {
+    let (folder, store) = store();
+    fill(&store, 2);
+    store.clear().unwrap();
+    assert_eq!(store.stat().unwrap(), StoreStat::default());
+    fs::remove_file(folder.path().join(TAG_FILE)).unwrap();
+    assert!(matches!(store.clear(), Err(StoreError::NotACache(_))));
+}
+
+#[test]
+fn an_unchanged_file_is_not_hashed_twice_but_a_fresh_one_is() {
+    let (folder, store) = store();
+    let file = folder.path().join("part.stl");
+    fs::write(&file, b"one").unwrap();
+    let index = StatIndex::open(&store);
+    assert_eq!(index.hash(&file).unwrap(), blake3::hash(b"one"));
+    // Same size, same second: only a hash can tell.
+    fs::write(&file, b"two").unwrap();
+    assert_eq!(index.hash(&file).unwrap(), blake3::hash(b"two"));
+    age(&file, 100);
+    let settled = fs::metadata(&file).unwrap().modified().unwrap();
+    index.hash(&file).unwrap();
+    index.flush(&store);
+    let again = StatIndex::open(&store);
+    fs::write(&file, b"six").unwrap();
+    fs::File::options().append(true).open(&file).unwrap().set_modified(settled).unwrap();
+    assert_eq!(again.hash(&file).unwrap(), blake3::hash(b"two"), "the stat is the same, so the index answers");
+    age(&file, 50);
+    assert_eq!(again.hash(&file).unwrap(), blake3::hash(b"six"));
+}
+
+#[test]
+fn eight_writers_of_one_key_agree() {
+    let (_folder, store) = store();
+    std::thread::scope(|scope| {
+        for _ in 0..8 {
+            scope.spawn(|| fill(&store, 20));
+        }
+    });
+    assert_eq!(
+        store.stat().unwrap(),
+        StoreStat { entries: 20, blobs: 20, bytes: store.stat().unwrap().bytes, leftovers: 0 }
+    );
+}
