@@ -22,7 +22,17 @@ const LAYERS: &[(&str, &[&str])] = &[
     (
         "cli",
         &[
-            "report", "run", "plan", "store", "schema", "steps", "step", "technique", "metric", "format", "recipe",
+            "report",
+            "run",
+            "plan",
+            "store",
+            "schema",
+            "steps",
+            "step",
+            "technique",
+            "metric",
+            "format",
+            "recipe",
             "mesh",
         ],
     ),

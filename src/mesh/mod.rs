@@ -2,13 +2,19 @@
 
 pub mod bvh;
 pub mod carried;
+pub mod classes;
+pub mod edit;
+pub mod freedom;
 pub mod geometry;
+pub mod halfedge;
 pub mod id;
 pub mod predicate;
 pub mod soup;
 pub mod surface;
 
 pub use carried::{Carried, EdgeKey, EdgeMark, Field, Freedom, Groups, MarkCause, Regions, SeamId, Support, edge_key};
+pub use freedom::{FreedomError, LockRules, ResolvedFreedom, Rim, resolve_freedom};
+pub use halfedge::HalfedgeMesh;
 pub use id::{EdgeId, FaceId, HalfedgeId, Id, IdVec, VertexId};
 pub use soup::{Facet, Soup};
 pub use surface::Surface;

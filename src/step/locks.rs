@@ -3,6 +3,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::mesh::{LockRules, Rim};
+
 /// What edits may do to the rims of an open surface.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
@@ -28,4 +30,16 @@ pub struct Locks {
     pub only: Vec<String>,
     /// What happens to the rims of an open surface.
     pub boundary: Boundary,
+}
+
+impl Locks {
+    /// The same locks as the kernel resolves them.
+    pub fn rules(&self) -> LockRules<'_> {
+        let rim = match self.boundary {
+            Boundary::Exact => Rim::Exact,
+            Boundary::Curve => Rim::Curve,
+            Boundary::Free => Rim::Free,
+        };
+        LockRules { keep: &self.keep, on_curve: &self.on_curve, only: &self.only, rim }
+    }
 }
