@@ -1,5 +1,8 @@
 //! The metrics: one definition each, used by steps, gates, sweeps, reports and snapshots.
 
+pub mod gate;
+pub mod registry;
+
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
