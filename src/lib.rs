@@ -1,5 +1,6 @@
 //! meshmill: recipes that turn any triangle mesh into a finite-element surface mesh, run as a cached graph.
 
+pub mod format;
 pub mod mesh;
 pub mod metric;
 pub mod plan;
