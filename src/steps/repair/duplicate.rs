@@ -1,0 +1,95 @@
+//! Faces that cannot be part of a surface: those that repeat a corner, and those that are there twice.
+
+use super::adjacency::{EdgeTable, apex, face_of};
+use super::draft::Draft;
+use crate::mesh::id::Face;
+use crate::mesh::{FaceId, IdVec, VertexId};
+
+/// Drops faces that name a vertex twice; returns how many.
+pub(super) fn drop_collapsed(draft: &mut Draft) -> u64 {
+    let keep: Vec<bool> = draft.faces.iter().map(|[a, b, c]| a != b && b != c && c != a).collect();
+    let dropped = keep.iter().filter(|&&k| !k).count() as u64;
+    if dropped > 0 {
+        draft.retain_faces(&keep);
+    }
+    dropped
+}
+
+/// How many faces were dropped because others cover the same three vertices.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Duplicates {
+    /// Repeats of a face.
+    pub(super) repeated: u64,
+    /// Faces of pairs that look in opposite directions and enclose nothing.
+    pub(super) cancelled: u64,
+}
+
+/// Drops repeated faces. Of two faces that look in opposite directions both go, when `cancel` allows it and their
+/// neighbours still meet in pairs afterwards; otherwise the first one stays.
+pub(super) fn drop_duplicates(draft: &mut Draft, table: &EdgeTable, cancel: bool) -> Duplicates {
+    let mut dropped = Duplicates::default();
+    let groups = duplicate_groups(&draft.faces, table);
+    if groups.is_empty() {
+        return dropped;
+    }
+    let mut keep = vec![true; draft.faces.len()];
+    let mut pairs = Vec::new();
+    for group in groups {
+        let is_even = |f: FaceId| is_even_permutation(draft.faces[f]);
+        let first = group[0];
+        let opposite = group.iter().copied().find(|&f| is_even(f) != is_even(first));
+        for &f in group.iter().filter(|&&f| f != first && Some(f) != opposite) {
+            keep[f.index()] = false;
+            dropped.repeated += 1;
+        }
+        pairs.extend(opposite.map(|second| [first, second]));
+    }
+    settle_pairs(&mut keep, &mut dropped, table, &pairs, cancel);
+    draft.retain_faces(&keep);
+    dropped
+}
+
+/// Decides on each pair of opposite faces, by the number of kept faces at their edges.
+fn settle_pairs(keep: &mut [bool], dropped: &mut Duplicates, table: &EdgeTable, pairs: &[[FaceId; 2]], cancel: bool) {
+    let mut odd = vec![false; keep.len()];
+    for (_, _, group) in table.edges() {
+        if group.iter().filter(|(_, h)| keep[face_of(*h).index()]).count() % 2 == 1 {
+            for (_, h) in group {
+                odd[face_of(*h).index()] = true;
+            }
+        }
+    }
+    for &[first, second] in pairs {
+        keep[second.index()] = false;
+        if cancel && !odd[first.index()] {
+            keep[first.index()] = false;
+            dropped.cancelled += 2;
+        } else {
+            dropped.repeated += 1;
+        }
+    }
+}
+
+/// Sets of faces with the same three vertices, each ascending; two such faces share an edge and the corner across it.
+fn duplicate_groups(faces: &IdVec<Face, [VertexId; 3]>, table: &EdgeTable) -> Vec<Vec<FaceId>> {
+    let mut suspects: Vec<([VertexId; 3], FaceId)> = Vec::new();
+    for (a, _, group) in table.edges() {
+        for (i, &(_, h)) in group.iter().enumerate() {
+            let across = apex(faces, h);
+            // The edge across from the lowest corner need not tell what the two others tell already.
+            let repeated = group.iter().enumerate().any(|(j, &(_, g))| i != j && apex(faces, g) == across);
+            if repeated && a < across {
+                let mut key = faces[face_of(h)];
+                key.sort_unstable();
+                suspects.push((key, face_of(h)));
+            }
+        }
+    }
+    suspects.sort_unstable();
+    suspects.dedup();
+    suspects.chunk_by(|a, b| a.0 == b.0).map(|chunk| chunk.iter().map(|s| s.1).collect()).collect()
+}
+
+fn is_even_permutation([a, b, c]: [VertexId; 3]) -> bool {
+    (a < b && b < c) || (b < c && c < a) || (c < a && a < b)
+}

@@ -1,0 +1,213 @@
+//! Repair: from any soup of triangles and quads to an oriented 2-manifold, or an error that says why not.
+//!
+//! # Algorithm
+//! Quads are split. Vertices at the same place are welded, then open vertices within a tolerance; collapsed and
+//! repeated faces go. At every edge with more than two faces these are joined in pairs by their order round the edge,
+//! and each vertex gets one copy for each fan of faces, which makes the mesh a manifold by construction. Neighbours
+//! are turned until they agree (a Möbius strip is cut), closed components until they look outward, and those that
+//! bound a cavity inward.
+//!
+//! Based on: Guéziec, Taubin, Lazarus, Horn. Cutting and stitching: converting sets of polygons to manifold surfaces.
+//! IEEE Transactions on Visualization and Computer Graphics 7(2), 2001.
+//!
+//! # Invariants
+//! - The result is an oriented 2-manifold, with a border where the input has one that was not filled.
+//! - Outside filled holes the surface moves no further than `max-move`.
+//! - Idempotent: repairing the result changes nothing.
+//! - Groups, regions, marks and fields follow their elements.
+//! - Closed manifold input keeps its topology: nothing but open edges is welded within a tolerance.
+//!
+//! # Cost
+//! O(F log F) time, O(F) memory.
+//!
+//! # Departures
+//! Guéziec and others stitch borders again after cutting; here faces are joined before the cut, in radial order, so
+//! that solids which touch come apart as solids and sheets go straight on.
+
+mod adjacency;
+mod carry;
+mod components;
+mod cut;
+mod draft;
+mod duplicate;
+mod non_manifold;
+mod orient;
+mod outward;
+mod params;
+mod report;
+mod weld;
+
+pub use params::{FillHoles, KeepComponents, NonManifold, RepairParams, SelfIntersections};
+pub use report::{ComponentStats, LoopFate, LoopStats, RepairError, RepairStats};
+
+use glam::DVec3;
+
+use self::adjacency::{EdgeTable, Twins, face_of};
+use self::draft::Draft;
+use self::outward::Part;
+use crate::mesh::{Facet, Soup, Surface};
+use crate::step::{Artifact, InputDef, Inputs, Locks, OutPort, OutputDef, Port, Produced, StepFailure};
+use crate::watch::Watch;
+
+/// Repairs `soup`.
+///
+/// # Errors
+/// [`RepairError`]: nothing to repair, nothing left of it, or a corner that is not there.
+pub fn repair(soup: &Soup, params: &RepairParams, watch: &Watch) -> Result<(Surface, RepairStats), RepairError> {
+    let diagonal = check_input(soup)?;
+    let mut stats = RepairStats::default();
+    let limit = params.max_move.unwrap_or(params.weld).resolve(diagonal);
+    let tolerance = params.weld.resolve(diagonal).min(limit);
+    let mut draft = conform(soup, params, tolerance, &mut stats);
+    watch.check()?;
+    let mut twins = make_manifold(&mut draft, &mut stats);
+    watch.check()?;
+    let parts = choose_components(&mut draft, &mut twins, params, &mut stats)?;
+    let (turned, cavities) = outward::orient_outward(&mut draft, &mut twins, &parts);
+    (stats.components_turned, stats.cavities) = (turned, cavities);
+    check_result(&draft, &stats, limit)?;
+    Ok((carry::finish(&draft, soup, params.non_manifold == NonManifold::Seam), stats))
+}
+
+/// The bounding-box diagonal of the vertices in use.
+fn check_input(soup: &Soup) -> Result<f64, RepairError> {
+    let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    for (face, facet) in soup.faces.enumerate() {
+        for &corner in facet.corners() {
+            match soup.points.get(corner) {
+                Some(point) if point.is_finite() => (low, high) = (low.min(*point), high.max(*point)),
+                _ => return Err(RepairError::BadFace { face }),
+            }
+        }
+    }
+    if soup.faces.is_empty() { Err(RepairError::Empty) } else { Ok((high - low).length()) }
+}
+
+/// Triangles that share vertices wherever they touch, each there once.
+fn conform(soup: &Soup, params: &RepairParams, tolerance: f64, stats: &mut RepairStats) -> Draft {
+    let mut draft = draft::triangulate_and_weld_exactly(soup);
+    stats.quads_split = soup.faces.iter().filter(|facet| matches!(facet, Facet::Quad(_))).count() as u64;
+    stats.vertices_merged = (soup.points.len() - draft.points.len()) as u64;
+    stats.collapsed_faces = duplicate::drop_collapsed(&mut draft);
+    let table = EdgeTable::new(&draft.faces, draft.points.len());
+    stats.non_manifold_edges_read = count_non_manifold(&table);
+    let welded = weld::weld(&mut draft, &table, tolerance);
+    (stats.vertices_welded, stats.max_move) = (welded.vertices, welded.shift);
+    stats.collapsed_faces += duplicate::drop_collapsed(&mut draft);
+    let table = if welded.vertices > 0 { EdgeTable::new(&draft.faces, draft.points.len()) } else { table };
+    stats.non_manifold_edges_welded = count_non_manifold(&table);
+    let duplicates = duplicate::drop_duplicates(&mut draft, &table, params.non_manifold == NonManifold::Cut);
+    (stats.repeated_faces, stats.cancelled_faces) = (duplicates.repeated, duplicates.cancelled);
+    draft
+}
+
+fn count_non_manifold(table: &EdgeTable) -> u64 {
+    table.edges().filter(|(_, _, group)| group.len() > 2).count() as u64
+}
+
+/// Joins faces in pairs, lets neighbours agree, and gives every fan of faces its own vertices.
+fn make_manifold(draft: &mut Draft, stats: &mut RepairStats) -> Twins {
+    let table = EdgeTable::new(&draft.faces, draft.points.len());
+    let (mut twins, cut_edges) = non_manifold::pair_faces(draft, &table);
+    drop(table);
+    let oriented = orient::orient(draft, &mut twins);
+    let cut = cut::cut(draft, &mut twins, !cut_edges.is_empty());
+    stats.non_manifold_edges_cut = cut_edges.len() as u64;
+    stats.faces_turned = oriented.flipped;
+    stats.one_sided_edges_cut = oriented.conflicts.len() as u64;
+    (stats.vertices_cut, stats.vertex_copies) = (cut.vertices, cut.copies);
+    stats.double_edges_split = cut.split_edges;
+    twins
+}
+
+/// Drops the components that are not wanted, and describes the others.
+fn choose_components(
+    draft: &mut Draft,
+    twins: &mut Twins,
+    params: &RepairParams,
+    stats: &mut RepairStats,
+) -> Result<Vec<Part>, RepairError> {
+    let parts = components::components(draft, twins);
+    let wanted = components::wanted(&parts, params.keep_components);
+    stats.components = parts.len() as u64;
+    stats.components_dropped = wanted.iter().filter(|&&w| !w).count() as u64;
+    let listed = parts.iter().zip(&wanted).take(report::LISTED);
+    stats.component_list = listed
+        .map(|(part, &kept)| ComponentStats {
+            faces: part.faces.len() as u64,
+            area: part.area,
+            closed: part.closed,
+            kept,
+        })
+        .collect();
+    let dropped: usize = parts.iter().zip(&wanted).filter(|(_, w)| !**w).map(|(part, _)| part.faces.len()).sum();
+    if dropped == draft.faces.len() {
+        return Err(RepairError::NothingLeft { collapsed: stats.collapsed_faces, dropped: dropped as u64 });
+    }
+    if dropped == 0 {
+        return Ok(parts);
+    }
+    let mut keep = vec![true; draft.faces.len()];
+    for (part, _) in parts.iter().zip(&wanted).filter(|(_, wanted)| !**wanted) {
+        part.faces.iter().for_each(|f| keep[f.index()] = false);
+    }
+    draft.retain_faces(&keep);
+    *twins = EdgeTable::new(&draft.faces, draft.points.len()).twins();
+    Ok(components::components(draft, twins))
+}
+
+/// The promises: a manifold, and no more movement than allowed.
+fn check_result(draft: &Draft, stats: &RepairStats, limit: f64) -> Result<(), RepairError> {
+    let table = EdgeTable::new(&draft.faces, draft.points.len());
+    for (_, _, group) in table.edges() {
+        let agree = match *group {
+            [_] => true,
+            [(_, a), (_, b)] => adjacency::tail(&draft.faces, a) != adjacency::tail(&draft.faces, b),
+            _ => false,
+        };
+        if !agree {
+            let face = face_of(group[0].1);
+            let at = draft.corners(face)[0];
+            return Err(RepairError::NotManifold { face: draft.origin[face].face(), at });
+        }
+    }
+    if stats.max_move > limit {
+        return Err(RepairError::MovedTooFar { moved: stats.max_move, allowed: limit });
+    }
+    Ok(())
+}
+
+/// The room's entry in the catalog.
+#[derive(Debug)]
+pub struct Step;
+
+impl crate::step::Step for Step {
+    const NAME: &'static str = "repair";
+    const REVISION: u32 = 1;
+    const INPUTS: &'static [InputDef] = &[InputDef {
+        name: "from",
+        accepts: &[Port::Soup, Port::Surface],
+        required: true,
+        doc: "the mesh to repair, as read",
+    }];
+    const OUTPUTS: &'static [OutputDef] = &[OutputDef { name: "main", port: OutPort::Is(Port::Surface) }];
+    const CARRIES: &'static str = "groups, regions, marks and fields follow their elements; faces that fill holes are \
+        in the face group `filled`, and take region and values from the rim; seams are made anew";
+    const EXAMPLE: &'static str = "use = \"repair\"\nfrom = \"raw\"\nfill-holes = \"all\"\n";
+
+    type Params = RepairParams;
+    type Stats = RepairStats;
+
+    fn run(
+        inputs: &Inputs,
+        _output: &str,
+        params: &RepairParams,
+        _locks: &Locks,
+        watch: &Watch,
+    ) -> Result<Produced<RepairStats>, StepFailure> {
+        let soup = inputs.require("from")?.to_soup();
+        let soup = soup.ok_or_else(|| StepFailure::bad_input("expected a soup or a surface"))?;
+        let (surface, stats) = repair(&soup, params, watch)?;
+        Ok(Produced { artifact: Artifact::Surface(std::sync::Arc::new(surface)), stats })
+    }
+}

@@ -1,0 +1,145 @@
+//! Edges with more than two faces: which faces go on into which.
+//!
+//! After Guéziec, Taubin, Lazarus, Horn: Cutting and stitching: converting sets of polygons to manifold surfaces.
+//! IEEE TVCG 7(2), 2001. They leave open which faces to join again; here the radial order round the edge decides.
+
+use std::f64::consts::{PI, TAU};
+
+use glam::DVec3;
+
+use super::adjacency::{EdgeTable, NONE, Twins, apex, face_of, tail};
+use super::draft::{Draft, normal};
+use super::orient::{orient, turn};
+use crate::mesh::id::Face;
+use crate::mesh::{HalfedgeId, IdVec, VertexId};
+
+/// A non-manifold edge before it is cut.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct CutEdge {
+    /// Its ends.
+    pub(super) ends: [VertexId; 2],
+    /// The number of its faces.
+    pub(super) faces: usize,
+}
+
+/// Joins the faces at every edge in pairs. An odd face out becomes a border.
+///
+/// Where the faces alternate in direction round the edge, solids touch there, and each pair encloses material, so
+/// that the solids come apart. Elsewhere sheets meet, and the flattest pairs go on into each other: of three plates
+/// the straight two.
+pub(super) fn pair_faces(draft: &mut Draft, table: &EdgeTable) -> (Twins, Vec<CutEdge>) {
+    let mut twins = table.twins();
+    let is_cut = |group: &[(VertexId, HalfedgeId)]| group.len() > 2;
+    if !table.edges().any(|(_, _, group)| is_cut(group)) {
+        return (twins, Vec::new());
+    }
+    // Directions only mean something once each smooth part agrees with itself and closed parts look outward.
+    let parts = orient(draft, &mut twins).component;
+    turn_closed_parts_outward(draft, &mut twins, &parts);
+    let table = EdgeTable::new(&draft.faces, draft.points.len());
+    let mut cut = Vec::new();
+    for (a, b, group) in table.edges().filter(|(_, _, group)| is_cut(group)) {
+        let spokes = spokes(draft, a, b, group);
+        for (h, g) in pair_alternating(&spokes).unwrap_or_else(|| pair_flattest(&spokes)) {
+            twins[h] = g;
+            twins[g] = h;
+        }
+        cut.push(CutEdge { ends: [a, b], faces: group.len() });
+    }
+    (twins, cut)
+}
+
+/// Parts without open edges of their own whose volume is negative are turned round.
+fn turn_closed_parts_outward(draft: &mut Draft, twins: &mut Twins, parts: &IdVec<Face, u32>) {
+    let count = parts.iter().max().map_or(0, |&last| last as usize + 1);
+    let mut open = vec![false; count];
+    let mut volume = vec![0.0; count];
+    let table = EdgeTable::new(&draft.faces, draft.points.len());
+    for (_, _, group) in table.edges() {
+        for (_, h) in group {
+            let part = parts[face_of(*h)];
+            let own = group.iter().filter(|(_, g)| parts[face_of(*g)] == part).count();
+            open[part as usize] |= own % 2 == 1;
+        }
+    }
+    let middle = draft.faces.iter().next().map_or(DVec3::ZERO, |corners| draft.points[corners[0]]);
+    for (face, &part) in parts.enumerate() {
+        let [a, b, c] = draft.corners(face).map(|p| p - middle);
+        volume[part as usize] += a.dot(b.cross(c));
+    }
+    let chosen: IdVec<Face, bool> =
+        parts.iter().map(|&part| !open[part as usize] && volume[part as usize] < 0.0).collect();
+    turn(draft, twins, &chosen);
+}
+
+/// A face at an edge, seen along the edge.
+#[derive(Clone, Copy, Debug)]
+struct Spoke {
+    /// Its half-edge.
+    halfedge: HalfedgeId,
+    /// Its direction round the edge, in radians.
+    angle: f64,
+    /// Whether it runs from the lower end to the higher; then its outside is on the side of larger angles.
+    forward: bool,
+    /// Whether it has an area at all.
+    solid: bool,
+}
+
+/// The faces at an edge in the order of their angles.
+fn spokes(draft: &Draft, a: VertexId, b: VertexId, group: &[(VertexId, HalfedgeId)]) -> Vec<Spoke> {
+    let along = (draft.points[b] - draft.points[a]).normalize_or_zero();
+    let away = |h: HalfedgeId| (draft.points[apex(&draft.faces, h)] - draft.points[a]).reject_from_normalized(along);
+    let reference = along.any_orthonormal_vector();
+    let across = along.cross(reference);
+    let mut spokes: Vec<Spoke> = group
+        .iter()
+        .map(|&(_, h)| {
+            let away = away(h);
+            let angle = libm::atan2(away.dot(across), away.dot(reference)) + PI;
+            let forward = tail(&draft.faces, h) == a;
+            let solid = normal(draft.corners(face_of(h))).length_squared() > 0.0;
+            Spoke { halfedge: h, angle, forward, solid }
+        })
+        .collect();
+    spokes.sort_by(|s, t| s.angle.total_cmp(&t.angle).then(s.halfedge.cmp(&t.halfedge)));
+    spokes
+}
+
+/// Pairs that enclose material, if the faces alternate in direction all the way round.
+fn pair_alternating(spokes: &[Spoke]) -> Option<Vec<(HalfedgeId, HalfedgeId)>> {
+    let count = spokes.len();
+    let alternates = (0..count).all(|i| spokes[i].forward != spokes[(i + 1) % count].forward && spokes[i].solid);
+    if !alternates || !count.is_multiple_of(2) {
+        return None;
+    }
+    // A backward face has its inside towards larger angles, where its partner follows.
+    let pairs = (0..count).filter(|&i| !spokes[i].forward);
+    Some(pairs.map(|i| (spokes[i].halfedge, spokes[(i + 1) % count].halfedge)).collect())
+}
+
+/// Differences of angle below this (radians) are noise of rounded coordinates, and must not decide between pairs that
+/// are equally flat: all the edges along a joint should be paired alike.
+const SAME_ANGLE: f64 = 1e-4;
+
+/// Pairs in the order of their flatness; of equally flat ones those that agree in direction come first.
+fn pair_flattest(spokes: &[Spoke]) -> Vec<(HalfedgeId, HalfedgeId)> {
+    let mut candidates = Vec::new();
+    for (i, s) in spokes.iter().enumerate() {
+        for (j, t) in spokes.iter().enumerate().skip(i + 1) {
+            let turn = (s.angle - t.angle).abs();
+            let bend = PI - turn.min(TAU - turn);
+            let rank = (!(s.solid && t.solid), (bend / SAME_ANGLE).round() as u64, s.forward == t.forward);
+            candidates.push((rank, s.halfedge.min(t.halfedge), s.halfedge.max(t.halfedge), i, j));
+        }
+    }
+    candidates.sort_unstable();
+    let mut free = vec![true; spokes.len()];
+    let mut pairs = Vec::new();
+    for (_, h, g, i, j) in candidates {
+        if free[i] && free[j] {
+            (free[i], free[j]) = (false, false);
+            pairs.push((h, g));
+        }
+    }
+    pairs
+}

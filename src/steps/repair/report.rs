@@ -1,0 +1,188 @@
+//! What repair tells: every change counted, every loop and component listed, and why it refused.
+
+use glam::DVec3;
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use crate::mesh::FaceId;
+use crate::step::{ElementRef, StepFailure};
+use crate::watch::Cancelled;
+
+/// Lists in the statistics end after this many entries; the counts beside them are complete.
+pub(super) const LISTED: usize = 100;
+
+/// What repair found and changed.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub struct RepairStats {
+    /// Quads that were split into two triangles each.
+    pub quads_split: u64,
+    /// Vertices merged into another one at exactly the same place.
+    pub vertices_merged: u64,
+    /// Vertices merged into another one within the weld length.
+    pub vertices_welded: u64,
+    /// Faces dropped because they had a vertex twice, from the start or after welding.
+    pub collapsed_faces: u64,
+    /// Faces dropped because another one has the same three vertices.
+    pub repeated_faces: u64,
+    /// Faces dropped in pairs that looked in opposite directions.
+    pub cancelled_faces: u64,
+    /// Vertices that were put on an open edge they lay beside.
+    pub t_junctions: u64,
+    /// Edges with more than two faces before welding within a tolerance.
+    pub non_manifold_edges_read: u64,
+    /// Edges with more than two faces after it: a higher number means that the weld length is too large.
+    pub non_manifold_edges_welded: u64,
+    /// Edges with more than two faces that were cut.
+    pub non_manifold_edges_cut: u64,
+    /// Vertices that were cut because more than one fan of faces met there.
+    pub vertices_cut: u64,
+    /// Copies of vertices made by cutting.
+    pub vertex_copies: u64,
+    /// Edges split in the middle because another edge runs between the same vertices.
+    pub double_edges_split: u64,
+    /// Edges cut because their faces cannot agree on a side, as in a Möbius strip.
+    pub one_sided_edges_cut: u64,
+    /// Tiny sheets without thickness that hung on a solid and were dropped.
+    pub dangling_faces: u64,
+    /// Faces turned round to agree with their neighbours.
+    pub faces_turned: u64,
+    /// Closed components turned round as a whole to look outward.
+    pub components_turned: u64,
+    /// Closed components inside another one: they look inward.
+    pub cavities: u64,
+    /// Faces found whose height is below a millionth of their longest edge.
+    pub degenerate_faces: u64,
+    /// Edges collapsed to remove them.
+    pub edges_collapsed: u64,
+    /// Edges flipped to remove them.
+    pub edges_flipped: u64,
+    /// Degenerate faces at the border that were taken away.
+    pub slivers_dropped: u64,
+    /// Degenerate faces that could not be removed without moving the surface too far or tearing it.
+    pub degenerate_faces_left: u64,
+    /// Boundary loops before filling.
+    pub boundary_loops: u64,
+    /// The first loops, longest first.
+    pub loops: Vec<LoopStats>,
+    /// Holes filled.
+    pub holes_filled: u64,
+    /// Faces added by filling.
+    pub faces_filled: u64,
+    /// Connected components before the choice of `keep-components`.
+    pub components: u64,
+    /// Components dropped by that choice.
+    pub components_dropped: u64,
+    /// The first components, in the order of their faces.
+    pub component_list: Vec<ComponentStats>,
+    /// Pairs of faces that run through each other in the input, once welded; absent where it was not counted.
+    pub self_intersections_before: Option<u64>,
+    /// Pairs of faces that run through each other in the result.
+    pub self_intersections: Option<u64>,
+    /// The first faces of the result that run through others.
+    pub self_intersecting_faces: Vec<u32>,
+    /// How far the surface may have moved outside filled holes at most: a bound, in mesh units.
+    pub max_move: f64,
+}
+
+/// A boundary loop.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub struct LoopStats {
+    /// Number of its edges.
+    pub edges: u64,
+    /// Its length.
+    pub length: f64,
+    /// The mean of its vertices.
+    pub centre: [f64; 3],
+    /// What became of it.
+    pub fate: LoopFate,
+}
+
+/// What became of a boundary loop.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum LoopFate {
+    /// It is as it was, because no filling was asked for or it is too long.
+    Open,
+    /// It was filled.
+    Filled,
+    /// Every fill would fold back onto the surface, as for the outline of a plate; it is as it was.
+    FoldsBack,
+    /// Every fill would repeat an edge or a face of the surface; it is as it was.
+    Blocked,
+    /// Another loop or component lies within it; it is as it was, because a fill would bury that.
+    HoldsIsland,
+}
+
+/// A connected component.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub struct ComponentStats {
+    /// Number of its faces.
+    pub faces: u64,
+    /// Its area.
+    pub area: f64,
+    /// Whether it has no border.
+    pub closed: bool,
+    /// Whether it is part of the result.
+    pub kept: bool,
+}
+
+/// Why repair gave no surface.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum RepairError {
+    /// The run was interrupted.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+    /// There is nothing to repair.
+    #[error("the input has no faces")]
+    Empty,
+    /// Every face was degenerate or dropped.
+    #[error("no face is left: {collapsed} were degenerate, {dropped} belonged to dropped components")]
+    NothingLeft {
+        /// Degenerate faces.
+        collapsed: u64,
+        /// Faces of components that `keep-components` dropped.
+        dropped: u64,
+    },
+    /// A corner names a vertex that does not exist, or a coordinate is not finite.
+    #[error("face {face} has a corner that is missing or not finite")]
+    BadFace {
+        /// The face.
+        face: FaceId,
+    },
+    /// The surface would move too far.
+    #[error("the surface would move by up to {moved}, more than `max-move` = {allowed}")]
+    MovedTooFar {
+        /// The bound on the movement.
+        moved: f64,
+        /// The bound allowed.
+        allowed: f64,
+    },
+    /// The result is still no manifold.
+    #[error("the faces near ({at}) could not be made a manifold")]
+    NotManifold {
+        /// A face at fault, in the input's numbering.
+        face: FaceId,
+        /// A corner of it.
+        at: DVec3,
+    },
+}
+
+impl From<RepairError> for StepFailure {
+    fn from(error: RepairError) -> Self {
+        let message = error.to_string();
+        let element = |face: FaceId, at| ElementRef { kind: "face".to_owned(), id: u64::from(face.raw()), at };
+        match error {
+            RepairError::Cancelled(cancelled) => cancelled.into(),
+            RepairError::Empty => Self::bad_input(message).with_help("name a file that holds triangles or quads"),
+            RepairError::NothingLeft { .. } => Self::failed(message).with_help("reduce `weld`, or keep all components"),
+            RepairError::BadFace { face } => Self::bad_input(message).with_elements(vec![element(face, None)]),
+            RepairError::MovedTooFar { .. } => Self::failed(message).with_help("reduce `weld`, or raise `max-move`"),
+            RepairError::NotManifold { face, at } => Self::failed(message)
+                .with_help("look at the faces named, and remove or separate them in the program that made the mesh")
+                .with_elements(vec![element(face, Some(at))]),
+        }
+    }
+}
