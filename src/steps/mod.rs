@@ -1,8 +1,10 @@
 //! The catalog: every step that a recipe can use, one file and one line each.
 
 pub mod read;
+pub mod repair;
 
 use crate::step::StepDef;
 
 /// All steps, in the order of the workflow.
 pub static CATALOG: &[StepDef] = &[StepDef::of::<read::Step>()];
+pub static CATALOG: &[StepDef] = &[StepDef::of::<repair::Step>()];

@@ -5,8 +5,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::draft::{Draft, Origin};
 use crate::mesh::id::{Face, Vertex};
 use crate::mesh::{
-    Carried, EdgeKey, EdgeMark, FaceId, Field, Freedom, IdVec, MarkCause, Regions, SeamId, Soup, Support,
-    Surface, VertexId, edge_key,
+    Carried, EdgeKey, EdgeMark, FaceId, Field, Freedom, IdVec, MarkCause, Regions, SeamId, Soup, Support, Surface,
+    VertexId, edge_key,
 };
 
 /// The face group of the faces that fill holes.
@@ -38,7 +38,9 @@ impl Numbering {
         let count = draft.points.len();
         let mut used = IdVec::<Vertex, bool>::filled(false, count);
         for corners in &draft.faces {
-            corners.iter().for_each(|&v| used[v] = true);
+            for &v in corners {
+                used[v] = true;
+            }
         }
         let mut leader = IdVec::<Vertex, VertexId>::filled(UNUSED, count);
         let mut new_of = IdVec::filled(UNUSED, count);
@@ -136,10 +138,12 @@ impl PartsOfInput {
 }
 
 fn parts_of_input(draft: &Draft, count: usize) -> PartsOfInput {
-    let inputs = || draft.origin.enumerate().filter_map(|(f, origin)| match origin {
-        Origin::Input(face) => Some((*face, f)),
-        Origin::Filled(_) => None,
-    });
+    let inputs = || {
+        draft.origin.enumerate().filter_map(|(f, origin)| match origin {
+            Origin::Input(face) => Some((*face, f)),
+            Origin::Filled(_) => None,
+        })
+    };
     let mut offsets = IdVec::<Face, u32>::filled(0, count + 1);
     inputs().for_each(|(face, _)| offsets[FaceId::new(face.index() + 1)] += 1);
     for i in 0..count {
@@ -202,7 +206,9 @@ fn map_edges(draft: &Draft, from: &Carried, edges: &EdgesByPlace, carried: &mut 
     for (edge, mark) in &from.marks {
         // Seams are found anew: the input's may be welded by now.
         if mark.cause != MarkCause::Seam {
-            mapped(edge).into_iter().for_each(|edge| carried.mark(edge, *mark));
+            for edge in mapped(edge) {
+                carried.mark(edge, *mark);
+            }
         }
     }
 }
@@ -225,7 +231,9 @@ fn mark_seams(draft: &Draft, numbering: &Numbering, edges: &EdgesByPlace, carrie
     }
     let mark = EdgeMark { freedom: Freedom::Keep, cause: MarkCause::Seam };
     for same_place in edges.edges.chunk_by(|a, b| a.0 == b.0).filter(|chunk| chunk.len() > 1) {
-        same_place.iter().for_each(|(_, edge)| carried.mark(*edge, mark));
+        for (_, edge) in same_place {
+            carried.mark(*edge, mark);
+        }
     }
 }
 

@@ -1,6 +1,6 @@
 //! Cutting: every vertex gets one copy for each fan of faces that meet there.
 
-use super::adjacency::{EdgeTable, NONE, Twins, face_of, corner_of, halfedge, head, next, previous, tail};
+use super::adjacency::{EdgeTable, NONE, Twins, corner_of, face_of, halfedge, head, next, previous, tail};
 use super::draft::Draft;
 use crate::mesh::id::Vertex;
 use crate::mesh::{HalfedgeId, IdVec, VertexId};
@@ -91,7 +91,9 @@ fn split_double_edges(draft: &mut Draft, twins: &mut Twins) -> u64 {
             if faces.iter().any(|&f| touched[f]) {
                 continue;
             }
-            faces.into_iter().for_each(|f| touched[f] = true);
+            for f in faces {
+                touched[f] = true;
+            }
             let [a, b] = [tail(&draft.faces, edges[0]), head(&draft.faces, edges[0])];
             let middle = draft.new_vertex(draft.points[a].midpoint(draft.points[b]), &[a, b]);
             for (i, h) in edges.into_iter().enumerate() {
@@ -149,4 +151,3 @@ pub(super) fn join(twins: &mut Twins, a: HalfedgeId, b: HalfedgeId) {
     twins[a] = b;
     twins[b] = a;
 }
-

@@ -91,5 +91,6 @@ fn duplicate_groups(faces: &IdVec<Face, [VertexId; 3]>, table: &EdgeTable) -> Ve
 }
 
 fn is_even_permutation([a, b, c]: [VertexId; 3]) -> bool {
-    (a < b && b < c) || (b < c && c < a) || (c < a && a < b)
+    // Of the six orders these three turn the same way.
+    [[a, b, c], [b, c, a], [c, a, b]].iter().any(|turn| turn.is_sorted())
 }

@@ -7,7 +7,7 @@ use std::f64::consts::{PI, TAU};
 
 use glam::DVec3;
 
-use super::adjacency::{EdgeTable, NONE, Twins, apex, face_of, tail};
+use super::adjacency::{EdgeTable, Twins, apex, face_of, tail};
 use super::draft::{Draft, normal};
 use super::orient::{orient, turn};
 use crate::mesh::id::Face;

@@ -89,12 +89,12 @@ fn keep_majority(draft: &Draft, component: &IdVec<Face, u32>, turned: &mut IdVec
         if part.iter().all(|&f| !turned[f]) {
             continue;
         }
-        let balance: f64 = part
-            .iter()
-            .map(|&f| normal(draft.corners(f)).length() * if turned[f] { -1.0 } else { 1.0 })
-            .sum();
+        let balance: f64 =
+            part.iter().map(|&f| normal(draft.corners(f)).length() * if turned[f] { -1.0 } else { 1.0 }).sum();
         if balance < 0.0 {
-            part.iter().for_each(|&f| turned[f] = !turned[f]);
+            for &f in part {
+                turned[f] = !turned[f];
+            }
         }
     }
 }

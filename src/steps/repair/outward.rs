@@ -63,8 +63,7 @@ const PROBES: usize = 24;
 fn depth(draft: &Draft, parts: &[Part], which: usize) -> usize {
     let inner = &parts[which];
     let stride = inner.faces.len().div_ceil(PROBES).max(1);
-    let probes: Vec<DVec3> =
-        inner.faces.iter().step_by(stride).map(|&f| draft.points[draft.faces[f][0]]).collect();
+    let probes: Vec<DVec3> = inner.faces.iter().step_by(stride).map(|&f| draft.points[draft.faces[f][0]]).collect();
     let contains = |outer: &Part| {
         outer.closed
             && outer.low.cmple(inner.low).all()

@@ -74,9 +74,9 @@ impl<'a> Grid<'a> {
     fn new(draft: &'a Draft, used: impl Iterator<Item = VertexId>, tolerance: f64) -> Self {
         let points = &draft.points;
         let used: Vec<VertexId> = used.collect();
-        let (low, high) = used.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), &v| {
-            (low.min(points[v]), high.max(points[v]))
-        });
+        let (low, high) = used
+            .iter()
+            .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), &v| (low.min(points[v]), high.max(points[v])));
         let spacing = (high - low).length() / (used.len() as f64).sqrt();
         let cell = (spacing / 4.0).clamp(2.0 * tolerance, 64.0 * tolerance);
         let after = IdVec::filled(END, points.len());
@@ -149,11 +149,7 @@ fn find(parent: &mut IdVec<Vertex, VertexId>, mut v: VertexId) -> VertexId {
 const LARGEST_EXACT_CLUSTER: usize = 64;
 
 /// Each member with the vertex that it moves onto.
-fn assign(
-    points: &IdVec<Vertex, DVec3>,
-    mut members: Vec<VertexId>,
-    tolerance: f64,
-) -> Vec<(VertexId, VertexId)> {
+fn assign(points: &IdVec<Vertex, DVec3>, mut members: Vec<VertexId>, tolerance: f64) -> Vec<(VertexId, VertexId)> {
     // Order by place rather than by number: a file that lists the same vertices otherwise is welded alike.
     members.sort_by(|&a, &b| lexicographic(points[a], points[b]));
     if members.len() <= LARGEST_EXACT_CLUSTER {
@@ -168,13 +164,11 @@ fn assign(
     for v in members {
         let from_v = |u: VertexId| points[u].distance(points[v]);
         let nearest = leaders.iter().copied().min_by(|&a, &b| from_v(a).total_cmp(&from_v(b)));
-        match nearest.filter(|&leader| from_v(leader) <= tolerance) {
-            Some(leader) => assigned.push((v, leader)),
-            None => {
-                leaders.push(v);
-                assigned.push((v, v));
-            }
+        let near = nearest.filter(|&leader| from_v(leader) <= tolerance);
+        if near.is_none() {
+            leaders.push(v);
         }
+        assigned.push((v, near.unwrap_or(v)));
     }
     assigned
 }
