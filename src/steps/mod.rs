@@ -6,5 +6,4 @@ pub mod repair;
 use crate::step::StepDef;
 
 /// All steps, in the order of the workflow.
-pub static CATALOG: &[StepDef] = &[StepDef::of::<read::Step>()];
-pub static CATALOG: &[StepDef] = &[StepDef::of::<repair::Step>()];
+pub static CATALOG: &[StepDef] = &[StepDef::of::<read::Step>(), StepDef::of::<repair::Step>()];
