@@ -62,6 +62,16 @@ impl Classes {
         self.intern(&set)
     }
 
+    /// The class of the labels that both have.
+    pub fn intersection(&mut self, a: ClassId, b: ClassId) -> ClassId {
+        if a == b || a == 0 || b == 0 {
+            return if a == b { a } else { 0 };
+        }
+        let other = &self.sets[b as usize];
+        let set: LabelSet = self.sets[a as usize].iter().copied().filter(|l| other.binary_search(l).is_ok()).collect();
+        self.intern(&set)
+    }
+
     /// The labels of a class, sorted.
     pub fn labels(&self, class: ClassId) -> &[u32] {
         &self.sets[class as usize]

@@ -11,6 +11,8 @@ pub mod id;
 pub mod predicate;
 pub mod soup;
 pub mod surface;
+pub mod topology;
+pub mod validate;
 
 pub use carried::{Carried, EdgeKey, EdgeMark, Field, Freedom, Groups, MarkCause, Regions, SeamId, Support, edge_key};
 pub use freedom::{FreedomError, LockRules, ResolvedFreedom, Rim, resolve_freedom};

@@ -1,16 +1,22 @@
-//! Edits of the workshop: collapse, flip and split, each checked before it is applied.
+//! Edits of the workshop: collapse, flip, split and relocate, each checked before it is applied.
 //!
 //! A check reads the star of an edge and answers with a plan or a [`Refusal`]; applying a plan that was checked on the
 //! mesh as it is cannot fail. Topology and freedom are enforced here, for every caller; geometry (quality, tolerance,
 //! foldover) is the caller's. All checks and edits cost O(star) and allocate only for stars of more than 16 vertices.
 
 pub mod collapse;
+pub mod flip;
+pub mod relocate;
+pub mod split;
 #[cfg(test)]
 mod tests;
 
 use super::id::{EdgeId, VertexId};
 
-pub use collapse::{CollapsePlan, Placement, check_collapse, collapse};
+pub use collapse::{CollapsePlan, Placement, Ring, check_collapse, collapse};
+pub use flip::{FlipPlan, check_flip, flip};
+pub use relocate::{check_relocate, relocate};
+pub use split::{SplitPlan, check_split, split};
 
 /// Why an edit is not done.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]

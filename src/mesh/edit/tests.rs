@@ -125,3 +125,61 @@ fn a_group_keeps_its_last_face() {
     assert_eq!(groups.faces["one"].len(), 1);
     assert_eq!(groups.vertices["middle"].len(), 1);
 }
+
+/// A small linear congruential generator: the same edits in every run.
+struct Dice(u64);
+
+impl Dice {
+    fn roll(&mut self, sides: usize) -> usize {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        ((self.0 >> 33) as usize) % sides
+    }
+}
+
+fn random_edit(mesh: &mut HalfedgeMesh, dice: &mut Dice) -> bool {
+    let edge = crate::mesh::EdgeId::new(dice.roll(mesh.edge_slots()));
+    if !mesh.edge_is_live(edge) {
+        return false;
+    }
+    let [a, b] = mesh.ends(edge).map(|v| mesh.point(v));
+    let middle = (a + b) / 2.0;
+    match dice.roll(4) {
+        0 => check_split(mesh, edge).map(|plan| split(mesh, &plan, middle)).is_ok(),
+        1 => check_flip(mesh, edge).map(|plan| flip(mesh, &plan)).is_ok(),
+        _ => check_collapse(mesh, edge).map(|plan| collapse(mesh, &plan, middle)).is_ok(),
+    }
+}
+
+#[test]
+fn random_edits_keep_the_mesh_valid() {
+    use crate::mesh::validate::{validate_surface, validate_workshop};
+    let mut marked = grid(5);
+    let v = |x: u32, y: u32| VertexId::from_raw(y * 6 + x);
+    for x in 0..5 {
+        let mark = EdgeMark { freedom: Freedom::OnCurve, cause: MarkCause::Feature };
+        marked.carried.mark(edge_key(v(x, 2), v(x + 1, 2)), mark);
+    }
+    marked.carried.groups.faces.insert("half".into(), (0..25).map(crate::mesh::FaceId::new).collect());
+    marked.carried.groups.edges.insert("cut".into(), vec![edge_key(v(0, 2), v(1, 2))]);
+    marked.carried.groups.vertices.insert("row".into(), (6..12).map(VertexId::new).collect());
+    for (case, shape) in [octahedron(), grid(5), marked].iter().enumerate() {
+        for seed in 0..20 {
+            let mut mesh = if case == 1 { enter(shape) } else { enter_locked(shape) };
+            let mut dice = Dice(seed);
+            let (chi, loops) = (mesh.euler_characteristic(), mesh.boundary_loops().len());
+            for step in 0..300 {
+                if random_edit(&mut mesh, &mut dice) {
+                    assert_eq!(validate_workshop(&mesh), [], "case {case}, seed {seed}, step {step}");
+                    assert_eq!((mesh.euler_characteristic(), mesh.boundary_loops().len()), (chi, loops));
+                }
+            }
+            let left = mesh.leave().surface;
+            assert_eq!(validate_surface(&left), []);
+            let groups = &left.carried.groups;
+            assert!(groups.list().all(|(_, _, members)| members > 0));
+            let curve = left.carried.marks.iter().filter(|(_, m)| m.cause == MarkCause::Feature);
+            let length: f64 = curve.map(|(e, _)| left.points[e[0]].distance(left.points[e[1]])).sum();
+            assert!(case != 2 || (length - 5.0).abs() < 1e-12, "{length}");
+        }
+    }
+}
