@@ -4,6 +4,7 @@ pub mod format;
 pub mod mesh;
 pub mod metric;
 pub mod plan;
+pub mod recipe;
 pub mod step;
 pub mod steps;
 pub mod store;

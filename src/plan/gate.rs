@@ -1,49 +1,37 @@
 //! Gates as the recipe states them: a metric, limits, and what it is compared with.
 
-use std::fmt;
-
 use serde::{Deserialize, Serialize};
 
-/// One requirement on a mesh.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Check {
-    /// Name in the registry of metrics.
-    pub metric: String,
-    /// The smallest value that passes.
-    pub at_least: Option<Limit>,
-    /// The largest value that passes.
-    pub at_most: Option<Limit>,
-    /// The only value that passes.
-    pub equals: Option<Limit>,
-    /// Which elements do not count.
-    pub except: Option<Except>,
-}
-
-/// A threshold.
+/// A bound of a check, as the recipe gives it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Limit {
-    /// In the unit of the metric.
+    /// A number in the metric's unit: mesh units, degrees, a share from 0 to 1, a count.
     Number(f64),
-    /// Percent, as written: of the diagonal of the step compared with for a length, of one for a share.
+    /// Percent: of the diagonal for lengths, of 1 for shares.
     Percent(f64),
-    /// A property that must hold or not.
+    /// For metrics that hold or not.
     Flag(bool),
 }
 
-impl fmt::Display for Limit {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Number(value) => write!(f, "{value}"),
-            Self::Percent(value) => write!(f, "{value}%"),
-            Self::Flag(value) => write!(f, "{value}"),
-        }
-    }
-}
-
-/// Elements that a check does not count.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Except {
-    /// Faces in which marked features meet below the angle that the threshold asks for.
-    FeatureAngle,
+/// One line of a gate: a metric and what it must be.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default, rename_all = "kebab-case")]
+pub struct Check {
+    /// The metric's name in the registry.
+    pub metric: String,
+    /// The value must be at least this.
+    pub at_least: Option<Limit>,
+    /// The value must be at most this.
+    pub at_most: Option<Limit>,
+    /// The value must be exactly this.
+    pub equals: Option<Limit>,
+    /// The value must equal that of the reference: `euler-characteristic = { same-as = "clean" }`.
+    pub same_as_reference: bool,
+    /// The value must not exceed that of the reference: no new self-intersections.
+    pub no_more_than_reference: bool,
+    /// The step that the check compares with, named by `to`, `same-as` or `no-more-than`; absent where none is needed.
+    pub reference: Option<String>,
+    /// Face groups that are not judged.
+    pub except: Vec<String>,
 }

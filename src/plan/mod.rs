@@ -3,9 +3,20 @@
 //! A task's identity is what it does and to what, never who asked for it: the cases of a sweep share one graph, and
 //! what they have in common is one node. Outputs and gates hang on the nodes per case.
 
+mod bind;
+mod build;
+mod case;
 pub mod gate;
+mod gates;
 pub mod key;
+pub mod merge;
+mod outputs;
 pub mod task;
+#[cfg(test)]
+mod tests;
+#[cfg(test)]
+mod toy;
+mod wire;
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -14,8 +25,14 @@ use petgraph::Direction;
 use petgraph::graph::DiGraph;
 use petgraph::visit::EdgeRef;
 
-pub use gate::{Check, Except, Limit};
+pub use bind::LOCK_KEYS;
+pub use build::{plan, plan_cases};
+pub use case::{CaseSpec, Context};
+pub use gate::{Check, Limit};
+pub use gates::CHECK_KEYS;
 pub use key::{Change, ContentHash, Key, Record, task_key, task_record};
+pub use merge::PlanBuilder;
+pub use outputs::{ELEMENTS, OUTPUT_KEYS};
 pub use task::{GateTask, SourceTask, StepTask, Task, TaskId};
 
 /// Position of a case in [`Plan::cases`].

@@ -7,6 +7,7 @@ pub mod artifact;
 pub mod failure;
 pub mod length;
 pub mod locks;
+pub mod parameters;
 
 use std::sync::Arc;
 

@@ -1,0 +1,226 @@
+//! The `[outputs]` section: which files are written of which step.
+
+use std::collections::BTreeMap;
+use std::path::{Component, Path, PathBuf};
+
+use super::bind::BoundDecl;
+use super::case::CaseContext;
+use super::gates::is_mesh;
+use super::wire::{Producer, Wiring, producer};
+use crate::recipe::suggest::did_you_mean;
+use crate::recipe::{Diagnostic, Entry, Node, Span, Table, Tree};
+
+/// The keys of an output table.
+pub const OUTPUT_KEYS: [&str; 6] = ["file", "element", "midside-on", "binary", "precision", "first-id"];
+
+/// The shell elements of solver formats.
+pub const ELEMENTS: [&str; 4] = ["S3", "S4", "S6", "S8R"];
+
+/// Files that a run writes itself.
+const RESERVED: [&str; 2] = ["run.ron", "failed"];
+
+/// A file to write, before its tasks have nodes.
+#[derive(Clone, Debug, Default)]
+pub(super) struct OutputDecl {
+    /// As the recipe names it.
+    pub(super) step: String,
+    pub(super) producer: Option<Producer>,
+    pub(super) file: PathBuf,
+    pub(super) element: Option<String>,
+    pub(super) midside_on: Option<Producer>,
+    pub(super) binary: Option<bool>,
+    pub(super) precision: Option<u32>,
+    pub(super) first_id: Option<u64>,
+}
+
+/// Reads all outputs, in the order they are written.
+pub(super) fn outputs<'r>(steps: &[BoundDecl<'r>], wiring: &Wiring, context: &mut CaseContext<'r>) -> Vec<OutputDecl> {
+    let mut reader = Reader { steps, wiring, context, taken: BTreeMap::new() };
+    let mut outputs = Vec::new();
+    let recipe = reader.context.recipe;
+    for (name, entry) in recipe.outputs.in_order() {
+        let producer = reader.mesh_step(name, entry.key);
+        let items = match &entry.value.value {
+            Node::List(items) => items.as_slice(),
+            _ => std::slice::from_ref(&entry.value),
+        };
+        for item in items {
+            let Some(mut output) = reader.output(name, item) else { continue };
+            output.producer = producer;
+            outputs.push(output);
+        }
+    }
+    outputs
+}
+
+struct Reader<'a, 'r> {
+    steps: &'a [BoundDecl<'r>],
+    wiring: &'a Wiring,
+    context: &'a mut CaseContext<'r>,
+    /// Files by lower-case name, since some file systems do not tell cases apart.
+    taken: BTreeMap<String, Span>,
+}
+
+impl Reader<'_, '_> {
+    fn problem(&mut self, span: Span, message: impl Into<String>, help: Option<String>) {
+        self.context.problems.push(Diagnostic::error(span, message).help_opt(help));
+    }
+
+    fn mesh_step(&mut self, name: &str, span: Span) -> Option<Producer> {
+        let found = producer(name, span, self.steps, self.context.recipe, &mut self.context.problems)?;
+        if let Some(port) = self.wiring.port(found)
+            && !is_mesh(port)
+        {
+            let message = format!("`{name}` gives {port}, which is no mesh that could be written");
+            self.problem(span, message, Some("metrics are in the report of the run".to_owned()));
+        }
+        Some(found)
+    }
+
+    fn output(&mut self, step: &str, item: &Tree) -> Option<OutputDecl> {
+        let recipe = self.context.recipe;
+        let value = self.context.scope.substitute(item, &recipe.sources, &mut self.context.problems)?;
+        let mut output = OutputDecl { step: step.to_owned(), ..OutputDecl::default() };
+        match &value.value {
+            Node::Text(_) => output.file = self.file(step, &value)?,
+            Node::Table(table) => self.table(step, &value, table, &mut output)?,
+            other => {
+                let message = format!("an output is a file name or a table with `file`, got {}", other.kind());
+                self.problem(value.span, message, None);
+                return None;
+            }
+        }
+        Some(output)
+    }
+
+    fn table(&mut self, step: &str, value: &Tree, table: &Table, output: &mut OutputDecl) -> Option<()> {
+        for (key, entry) in table.in_order() {
+            match key {
+                "file" => {}
+                "element" => output.element = self.element(entry),
+                "midside-on" => {
+                    output.midside_on = match &entry.value.value {
+                        Node::Text(name) => self.mesh_step(name, entry.value.span),
+                        other => {
+                            let message = format!("`midside-on` names a step, got {}", other.kind());
+                            self.problem(entry.value.span, message, None);
+                            None
+                        }
+                    };
+                }
+                "binary" => match entry.value.value {
+                    Node::Bool(binary) => output.binary = Some(binary),
+                    _ => self.problem(entry.value.span, "`binary` is true or false", None),
+                },
+                "precision" => output.precision = self.whole(key, entry, 1.0, 17.0).map(|digits| digits as u32),
+                "first-id" => output.first_id = self.whole(key, entry, 1.0, 1e9).map(|id| id as u64),
+                _ => {
+                    let help = did_you_mean(key, "keys", OUTPUT_KEYS);
+                    self.problem(entry.key, format!("an output has no key `{key}`"), help);
+                }
+            }
+        }
+        match table.get("file") {
+            Some(entry) => output.file = self.file(step, &entry.value)?,
+            None => self.problem(value.span, "this output does not name its `file`", None),
+        }
+        Some(())
+    }
+
+    fn element(&mut self, entry: &Entry) -> Option<String> {
+        if let Node::Text(name) = &entry.value.value {
+            if ELEMENTS.contains(&name.as_str()) {
+                return Some(name.clone());
+            }
+            let upper = name.to_uppercase();
+            let help = did_you_mean(&upper, "elements", ELEMENTS);
+            self.problem(entry.value.span, format!("there is no shell element `{name}`"), help);
+        } else {
+            let help = did_you_mean("", "elements", ELEMENTS);
+            self.problem(entry.value.span, "`element` names a shell element", help);
+        }
+        None
+    }
+
+    fn whole(&mut self, key: &str, entry: &Entry, least: f64, most: f64) -> Option<f64> {
+        let number = entry.value.as_number().filter(|n| n.fract() == 0.0 && (least..=most).contains(n));
+        if number.is_none() {
+            let message = format!("`{key}` is a whole number from {least} to {most}");
+            self.problem(entry.value.span, message, None);
+        }
+        number
+    }
+
+    /// The file of an output, which is new, has a known ending and stays in the folder of the outputs.
+    fn file(&mut self, step: &str, value: &Tree) -> Option<PathBuf> {
+        let Node::Text(template) = &value.value else {
+            self.problem(value.span, format!("`file` is a file name, got {}", value.value.kind()), None);
+            return None;
+        };
+        let name = self.fill(template, step, value.span)?;
+        let path = Path::new(&name);
+        let plain = path.components().all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
+        let odd = name.chars().any(|c| c.is_control() || "\\:*?\"<>|".contains(c));
+        if name.is_empty() || !plain || odd || name.len() > 200 {
+            let message = format!("`{name}` is not a file name below the folder of the outputs");
+            let help = "no absolute path, no `..`; `--out` moves the folder";
+            self.problem(value.span, message, Some(help.to_owned()));
+            return None;
+        }
+        let ending = path.extension().map(|ending| ending.to_string_lossy().to_lowercase()).unwrap_or_default();
+        if !self.context.endings.contains(&ending.as_str()) {
+            let help = did_you_mean(&ending, "endings", self.context.endings.iter().copied());
+            self.problem(value.span, format!("`{name}` has no ending of a format that can be written"), help);
+            return None;
+        }
+        let first = path.components().find(|part| *part != Component::CurDir);
+        if first.is_some_and(|part| RESERVED.iter().any(|name| part.as_os_str() == *name)) {
+            self.problem(value.span, format!("`{name}` is kept for what a run writes itself"), None);
+            return None;
+        }
+        let file: PathBuf = path.components().filter(|part| *part != Component::CurDir).collect();
+        let key = file.to_string_lossy().to_lowercase();
+        if let Some(earlier) = self.taken.insert(key, value.span) {
+            let problem = Diagnostic::error(value.span, format!("two outputs write the file `{name}`"))
+                .note("written again here")
+                .label(earlier, "first written here")
+                .help("give each output its own name; `{step}` in a name stands for the step");
+            self.context.problems.push(problem);
+            return None;
+        }
+        Some(file)
+    }
+
+    /// Puts parameters, the recipe's name and the step's name into a template.
+    fn fill(&mut self, template: &str, step: &str, span: Span) -> Option<String> {
+        let mut name = String::new();
+        let mut rest = template;
+        while let Some(open) = rest.find('{') {
+            name.push_str(&rest[..open]);
+            let Some(length) = rest[open..].find('}') else {
+                self.problem(span, format!("`{template}` has a `{{` without `}}`"), None);
+                return None;
+            };
+            let variable = &rest[open + 1..open + length];
+            match variable {
+                "step" => name.push_str(step),
+                "name" => name.push_str(&self.context.recipe.name),
+                _ => name.push_str(&self.param(variable, span)?),
+            }
+            rest = &rest[open + length + 1..];
+        }
+        name.push_str(rest);
+        Some(name)
+    }
+
+    fn param(&mut self, variable: &str, span: Span) -> Option<String> {
+        if let Some(known) = self.context.scope.params.get(variable) {
+            // A parameter without a value has been reported.
+            return known.as_ref().map(|value| value.to_string().replace('%', "pct"));
+        }
+        let params = self.context.scope.params.keys().map(String::as_str);
+        let help = did_you_mean(variable, "names", params.chain(["step", "name"]));
+        self.problem(span, format!("there is no parameter `{variable}` to put into the file name"), help);
+        None
+    }
+}
