@@ -6,12 +6,16 @@
 
 mod binary;
 mod builder;
+mod element;
 mod error;
+mod inp;
 mod obj;
 mod polygon;
 mod sets;
 mod stl;
 mod text;
+mod vtk;
+mod vtu;
 mod weld;
 
 use glam::DVec3;
@@ -31,6 +35,10 @@ pub enum Format {
     Stl,
     /// Wavefront OBJ.
     Obj,
+    /// VTK XML, unstructured grids and polygonal data.
+    Vtu,
+    /// Abaqus and CalculiX input.
+    Inp,
 }
 
 /// What a format is and does; one beside each reader and writer.
@@ -56,6 +64,10 @@ pub struct ReadCounts {
     pub faces_dropped: usize,
     /// Repeated corners merged into a vertex with identical coordinates (STL, which has no vertex numbers).
     pub corners_welded: usize,
+    /// Nodes that only mid-side positions or left-out elements used, left out.
+    pub nodes_dropped: usize,
+    /// Volumes and other elements that are no faces, left out.
+    pub elements_dropped: usize,
 }
 
 /// The mesh of a file, and what the reader did besides reading; or why there is none.
@@ -113,12 +125,14 @@ impl std::fmt::Debug for WriteOptions<'_> {
 
 impl Format {
     /// All formats.
-    pub const ALL: &'static [Self] = &[Self::Stl, Self::Obj];
+    pub const ALL: &'static [Self] = &[Self::Stl, Self::Obj, Self::Vtu, Self::Inp];
 
     fn def(self) -> &'static FormatDef {
         match self {
             Self::Stl => &stl::DEF,
             Self::Obj => &obj::DEF,
+            Self::Vtu => &vtu::DEF,
+            Self::Inp => &inp::DEF,
         }
     }
 

@@ -1,0 +1,340 @@
+//! Reads input files: first the cards with their numbers, then what the numbers mean.
+
+use std::collections::BTreeMap;
+
+use glam::DVec3;
+use rustc_hash::FxHashMap;
+
+use super::super::ReadCounts;
+use super::super::element::{Elements, Shape};
+use super::super::error::{FormatError, Place, Reason};
+use super::super::text::{parse_integer, parse_number};
+use super::elements::element_type;
+use super::sets::{Card, Kind, Sets};
+use crate::mesh::Soup;
+use crate::watch::Watch;
+
+/// Lines between two looks at the watch.
+const STRIDE: u64 = 1 << 16;
+
+/// Numbers of one part.
+#[derive(Debug, Default)]
+pub(super) struct Scope {
+    /// The part's name, empty outside parts.
+    pub(super) name: String,
+    /// Positions of nodes by number.
+    pub(super) nodes: FxHashMap<i64, u32>,
+    /// Positions of elements by number.
+    pub(super) elements: FxHashMap<i64, u32>,
+    /// Where its nodes begin and end.
+    first: usize,
+    end: usize,
+    /// Whether an instance was made of it.
+    placed: bool,
+}
+
+/// An element as its card gives it.
+#[derive(Debug)]
+struct RawElement {
+    scope: u32,
+    shape: Option<Shape>,
+    /// Where its nodes end in the list of all elements' nodes.
+    end: usize,
+    line: u64,
+}
+
+/// What data lines belong to.
+#[derive(Debug)]
+enum Block {
+    Skip,
+    Nodes { set: Option<usize> },
+    Elements { shape: Option<Shape>, nodes: usize, set: Option<usize> },
+    Set { card: usize },
+    Instance { scope: usize, lines: usize },
+}
+
+#[derive(Debug)]
+struct Reader {
+    points: Vec<DVec3>,
+    scopes: Vec<Scope>,
+    scope: usize,
+    instances: BTreeMap<String, usize>,
+    elements: Vec<RawElement>,
+    element_nodes: Vec<i64>,
+    cards: Vec<Card>,
+    block: Block,
+    /// Nodes that the last element still wants.
+    missing: usize,
+}
+
+/// Reads an input file.
+pub(super) fn read(bytes: &[u8], watch: &Watch) -> Result<(Soup, ReadCounts), FormatError> {
+    let mut reader = Reader {
+        points: Vec::new(),
+        scopes: vec![Scope::default()],
+        scope: 0,
+        instances: BTreeMap::new(),
+        elements: Vec::new(),
+        element_nodes: Vec::new(),
+        cards: Vec::new(),
+        block: Block::Skip,
+        missing: 0,
+    };
+    let mut keyword: Option<(String, u64)> = None;
+    let lines = bytes.split(|&b| b == b'\n').map(<[u8]>::trim_ascii);
+    for (line, number) in lines.zip(1_u64..) {
+        if number.is_multiple_of(STRIDE) {
+            watch.check()?;
+        }
+        if line.is_empty() || line.starts_with(b"**") {
+            continue;
+        }
+        let place = Place::Line(number);
+        match keyword.take() {
+            Some((mut text, begun)) => {
+                text.push_str(&String::from_utf8_lossy(line));
+                keyword = reader.keyword(text, begun)?;
+            }
+            None if line.starts_with(b"*") => {
+                reader.end_block(place)?;
+                keyword = reader.keyword(String::from_utf8_lossy(line).into_owned(), number)?;
+            }
+            None => reader.data(line, number)?,
+        }
+    }
+    reader.end_block(Place::File)?;
+    reader.finish()
+}
+
+/// The comma-separated items of a data line; a comma at the end is no item.
+fn items(line: &[u8]) -> impl Iterator<Item = &[u8]> {
+    line.strip_suffix(b",").unwrap_or(line).split(|&b| b == b',').map(<[u8]>::trim_ascii)
+}
+
+impl Reader {
+    /// Takes a keyword line; gives it back when it goes on in the next line.
+    fn keyword(&mut self, text: String, line: u64) -> Result<Option<(String, u64)>, FormatError> {
+        if text.ends_with(',') {
+            return Ok(Some((text, line)));
+        }
+        let place = Place::Line(line);
+        let mut parts = text.split(',').map(str::trim);
+        let name = parts.next().unwrap_or("").trim_start_matches('*').trim().to_ascii_uppercase();
+        let parameters: Vec<(String, &str)> = parts
+            .map(|p| p.split_once('=').unwrap_or((p, "")))
+            .map(|(k, v)| (k.trim().to_ascii_uppercase(), v.trim().trim_matches('"')))
+            .collect();
+        let value = |key: &str| parameters.iter().find(|(k, _)| k == key).map(|&(_, v)| v);
+        self.block = match name.as_str() {
+            "NODE" => {
+                if value("SYSTEM").is_some_and(|s| !s.eq_ignore_ascii_case("R")) {
+                    let what = "a cylindrical or spherical system of nodes".to_owned();
+                    return Err(FormatError::new(place, Reason::Unsupported(what)));
+                }
+                Block::Nodes { set: value("NSET").map(|n| self.card(Kind::Nodes, n, false, self.scope)) }
+            }
+            "ELEMENT" => self.element_block(value("TYPE"), value("ELSET"), line)?,
+            "NSET" | "ELSET" | "SURFACE" => {
+                let key = match name.as_str() {
+                    "SURFACE" => value("NAME"),
+                    own => value(own),
+                };
+                let Some(set) = key.filter(|n| !n.is_empty()) else {
+                    return Err(FormatError::unexpected(place, "the name of a set", text.as_bytes()));
+                };
+                let kind = match (name.as_str(), value("TYPE")) {
+                    ("NSET", _) => Kind::Nodes,
+                    ("ELSET", _) => Kind::Elements,
+                    (_, Some(t)) if t.eq_ignore_ascii_case("NODE") => Kind::NodeSurface,
+                    _ => Kind::Surface,
+                };
+                let scope = self.scope_of(value("INSTANCE"), place)?;
+                Block::Set { card: self.card(kind, set, value("GENERATE").is_some(), scope) }
+            }
+            "INCLUDE" => {
+                return Err(FormatError::new(place, Reason::Unsupported("*INCLUDE".into()))
+                    .with_remedy("put the included file's lines in its place"));
+            }
+            "SYSTEM" => {
+                return Err(FormatError::new(place, Reason::Unsupported("*SYSTEM".into()))
+                    .with_remedy("write the nodes in global coordinates"));
+            }
+            "PART" => {
+                let name = value("NAME").unwrap_or("").to_owned();
+                let first = self.points.len();
+                self.scopes.push(Scope { name, first, end: first, ..Scope::default() });
+                self.scope = self.scopes.len() - 1;
+                Block::Skip
+            }
+            "END PART" | "ENDPART" => {
+                self.scope = 0;
+                Block::Skip
+            }
+            "INSTANCE" => self.instance(value("NAME").unwrap_or(""), value("PART").unwrap_or(""), place)?,
+            _ => Block::Skip,
+        };
+        Ok(None)
+    }
+
+    fn element_block(&mut self, kind: Option<&str>, set: Option<&str>, line: u64) -> Result<Block, FormatError> {
+        let Some(kind) = kind else {
+            return Err(FormatError::new(Place::Line(line), Reason::Nothing("element type (TYPE=)")));
+        };
+        let known = element_type(&kind.to_ascii_uppercase());
+        let set = set.map(|n| self.card(Kind::Elements, n, false, self.scope));
+        Ok(Block::Elements { shape: known.map(|(s, _)| s), nodes: known.map_or(0, |(_, n)| n), set })
+    }
+
+    fn instance(&mut self, name: &str, part: &str, place: Place) -> Result<Block, FormatError> {
+        let found = self.scopes.iter().position(|s| !s.name.is_empty() && s.name.eq_ignore_ascii_case(part));
+        let Some(scope) = found else {
+            return Err(FormatError::unexpected(place, "a part defined above", part.as_bytes()));
+        };
+        if std::mem::replace(&mut self.scopes[scope].placed, true) {
+            let what = format!("a second instance of part {part}");
+            return Err(
+                FormatError::new(place, Reason::Unsupported(what)).with_remedy("export the assembly as one flat part")
+            );
+        }
+        self.instances.insert(name.to_ascii_uppercase(), scope);
+        Ok(Block::Instance { scope, lines: 0 })
+    }
+
+    fn scope_of(&self, instance: Option<&str>, place: Place) -> Result<usize, FormatError> {
+        let Some(name) = instance else { return Ok(self.scope) };
+        let found = self.instances.get(&name.to_ascii_uppercase()).copied();
+        found.ok_or_else(|| FormatError::unexpected(place, "an instance defined above", name.as_bytes()))
+    }
+
+    fn card(&mut self, kind: Kind, name: &str, generate: bool, scope: usize) -> usize {
+        self.cards.push(Card { kind, name: name.to_owned(), generate, scope, members: Vec::new(), rows: Vec::new() });
+        self.cards.len() - 1
+    }
+
+    fn data(&mut self, line: &[u8], number: u64) -> Result<(), FormatError> {
+        let place = Place::Line(number);
+        match self.block {
+            Block::Skip => Ok(()),
+            Block::Nodes { set } => self.node(line, set, place),
+            Block::Elements { shape, nodes, set } => self.element(line, (shape, nodes, set), number),
+            Block::Set { card } => self.cards[card].row(line, place),
+            Block::Instance { scope, lines } => {
+                self.block = Block::Instance { scope, lines: lines + 1 };
+                self.place_instance(scope, lines, line, place)
+            }
+        }
+    }
+
+    fn node(&mut self, line: &[u8], set: Option<usize>, place: Place) -> Result<(), FormatError> {
+        let mut items = items(line);
+        let id = parse_integer(items.next().unwrap_or(b""), "a node number", place)?;
+        let mut position = DVec3::ZERO;
+        for axis in 0..3 {
+            // Coordinates that are left out are zero.
+            if let Some(item) = items.next().filter(|i| !i.is_empty()) {
+                position[axis] = parse_number(item, "a coordinate", place)?;
+            }
+        }
+        let next = self.points.len() as u32;
+        if self.scopes[self.scope].nodes.insert(id, next).is_some() {
+            return Err(FormatError::new(place, Reason::Duplicate { what: "node", id }));
+        }
+        self.points.push(position);
+        self.scopes[self.scope].end = self.points.len();
+        if let Some(card) = set {
+            self.cards[card].members.push(next);
+        }
+        Ok(())
+    }
+
+    fn element(
+        &mut self,
+        line: &[u8],
+        (shape, nodes, set): (Option<Shape>, usize, Option<usize>),
+        number: u64,
+    ) -> Result<(), FormatError> {
+        let place = Place::Line(number);
+        let mut items = items(line);
+        if self.missing == 0 {
+            let id = parse_integer(items.next().unwrap_or(b""), "an element number", place)?;
+            let next = self.elements.len() as u32;
+            if self.scopes[self.scope].elements.insert(id, next).is_some() {
+                return Err(FormatError::new(place, Reason::Duplicate { what: "element", id }));
+            }
+            let (scope, end) = (self.scope as u32, self.element_nodes.len());
+            self.elements.push(RawElement { scope, shape, end, line: number });
+            self.missing = nodes;
+            if let Some(card) = set {
+                self.cards[card].members.push(next);
+            }
+        }
+        if shape.is_none() {
+            return Ok(());
+        }
+        for item in items.take(self.missing).collect::<Vec<_>>() {
+            self.element_nodes.push(parse_integer(item, "a node number", place)?);
+            self.missing -= 1;
+        }
+        if let Some(element) = self.elements.last_mut() {
+            element.end = self.element_nodes.len();
+        }
+        Ok(())
+    }
+
+    /// The first line of an instance moves it, the second turns it.
+    fn place_instance(&mut self, scope: usize, before: usize, line: &[u8], place: Place) -> Result<(), FormatError> {
+        let mut shift = DVec3::ZERO;
+        for (axis, item) in items(line).take(3).enumerate().filter(|(_, i)| !i.is_empty()) {
+            shift[axis] = parse_number(item, "a translation", place)?;
+        }
+        if before > 0 {
+            return Err(FormatError::new(place, Reason::Unsupported("a turned instance".into()))
+                .with_remedy("export the assembly as one flat part"));
+        }
+        let Scope { first, end, .. } = self.scopes[scope];
+        for point in &mut self.points[first..end] {
+            *point += shift;
+        }
+        Ok(())
+    }
+
+    fn end_block(&mut self, place: Place) -> Result<(), FormatError> {
+        self.block = Block::Skip;
+        match std::mem::take(&mut self.missing) {
+            0 => Ok(()),
+            _ => Err(FormatError::new(place, Reason::Truncated { within: "an element" })),
+        }
+    }
+
+    fn finish(self) -> Result<(Soup, ReadCounts), FormatError> {
+        if self.points.len() >= u32::MAX as usize || self.elements.len() >= u32::MAX as usize {
+            let limit = u64::from(u32::MAX) - 1;
+            return Err(FormatError::new(Place::File, Reason::TooMany { what: "nodes or elements", limit }));
+        }
+        let mut elements = Elements::new(self.points.len());
+        let mut placed = Vec::with_capacity(self.elements.len());
+        let mut begin = 0;
+        let mut nodes = Vec::new();
+        for raw in &self.elements {
+            nodes.clear();
+            let known = &self.scopes[raw.scope as usize].nodes;
+            for &id in &self.element_nodes[begin..raw.end] {
+                let missing = || {
+                    let (place, count) = (Place::Line(raw.line), known.len() as u64);
+                    FormatError::new(place, Reason::OutOfRange { what: "node", index: id, count })
+                };
+                nodes.push(*known.get(&id).ok_or_else(missing)?);
+            }
+            begin = raw.end;
+            placed.push(match raw.shape {
+                Some(shape) => elements.add(shape, &nodes, &self.points),
+                None => elements.leave_out(),
+            });
+        }
+        let mut soup = Soup { points: self.points.into(), ..Soup::default() };
+        let sides: Vec<_> = elements.faces.clone();
+        soup.carried.groups = Sets::resolve(&self.scopes, self.cards, &placed, &sides, soup.points.len())?;
+        let counts = elements.finish(&mut soup)?;
+        Ok((soup, counts))
+    }
+}

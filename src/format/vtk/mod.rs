@@ -1,0 +1,4 @@
+//! Legacy VTK.
+
+mod describe;
+pub(super) mod model;
