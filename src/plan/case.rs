@@ -16,8 +16,6 @@ pub struct Context<'a> {
     pub check_file: &'a dyn Fn(&Path) -> Result<(), String>,
     /// The endings of files that can be written, lower case, without the dot.
     pub endings: &'a [&'a str],
-    /// The metrics that a gate can check.
-    pub metrics: &'a [&'a str],
 }
 
 /// A case to plan: a name, and parameters that replace those of the recipe.
@@ -34,7 +32,6 @@ pub(super) struct CaseContext<'r> {
     pub(super) recipe: &'r Recipe,
     pub(super) catalog: &'static [StepDef],
     pub(super) endings: &'r [&'r str],
-    pub(super) metrics: &'r [&'r str],
     pub(super) scope: Scope,
     pub(super) problems: Vec<Diagnostic>,
     check: &'r dyn Fn(&Path) -> Result<(), String>,
@@ -48,7 +45,6 @@ impl<'r> CaseContext<'r> {
             recipe,
             catalog: context.catalog,
             endings: context.endings,
-            metrics: context.metrics,
             scope: Scope::default(),
             problems: Vec::new(),
             check: context.check_file,

@@ -4,8 +4,9 @@ use std::collections::BTreeMap;
 
 use super::bind::BoundDecl;
 use super::case::CaseContext;
-use super::gate::{Check, Limit};
 use super::wire::{Producer, Wiring, producer};
+use crate::metric::gate::{Check, Limit};
+use crate::metric::registry::{METRICS, MetricDef, Needs, Unit, find};
 use crate::recipe::suggest::did_you_mean;
 use crate::recipe::{Diagnostic, Entry, Node, Table, Tree};
 use crate::step::Port;
@@ -61,9 +62,7 @@ pub(super) fn is_mesh(port: Port) -> bool {
 fn checks(table: &Table, steps: &[BoundDecl<'_>], wiring: &Wiring, context: &mut CaseContext<'_>) -> Vec<Group> {
     let mut groups: BTreeMap<Option<(usize, &str)>, Group> = BTreeMap::new();
     for (metric, entry) in &table.entries {
-        if !known_metric(metric, entry, context) {
-            continue;
-        }
+        let Some(metric) = known_metric(metric, entry, context) else { continue };
         let recipe = context.recipe;
         let Some(value) = context.scope.substitute(&entry.value, &recipe.sources, &mut context.problems) else {
             continue;
@@ -75,33 +74,33 @@ fn checks(table: &Table, steps: &[BoundDecl<'_>], wiring: &Wiring, context: &mut
     groups.into_values().collect()
 }
 
-fn known_metric(metric: &str, entry: &Entry, context: &mut CaseContext<'_>) -> bool {
-    let known = context.metrics.contains(&metric);
-    if !known {
-        let message = format!("there is no metric `{metric}`");
-        let help = did_you_mean(metric, "metrics", context.metrics.iter().copied());
+fn known_metric(name: &str, entry: &Entry, context: &mut CaseContext<'_>) -> Option<&'static MetricDef> {
+    let known = find(name);
+    if known.is_none() {
+        let message = format!("there is no metric `{name}`");
+        let help = did_you_mean(name, "metrics", METRICS.iter().map(|metric| metric.name));
         context.problems.push(Diagnostic::error(entry.key, message).help_opt(help));
     }
     known
 }
 
 fn check(
-    metric: &str,
+    metric: &'static MetricDef,
     entry: &Entry,
     value: &Tree,
     steps: &[BoundDecl<'_>],
     wiring: &Wiring,
     context: &mut CaseContext<'_>,
 ) -> Option<(Check, Option<Producer>)> {
-    let mut check = Check { metric: metric.to_owned(), ..Check::default() };
+    let mut check = Check { metric: metric.name.to_owned(), ..Check::default() };
     let before = context.problems.len();
     let mut reference = None;
     if let Node::Table(table) = &value.value {
         for (key, entry) in table.in_order() {
             match key {
-                "at-least" => check.at_least = limit(&entry.value, context),
-                "at-most" => check.at_most = limit(&entry.value, context),
-                "equals" => check.equals = limit(&entry.value, context),
+                "at-least" => check.at_least = limit(metric, key, &entry.value, context),
+                "at-most" => check.at_most = limit(metric, key, &entry.value, context),
+                "equals" => check.equals = limit(metric, key, &entry.value, context),
                 "except" => check.except = groups(&entry.value, context),
                 "to" | "of" | "same-as" | "no-more-than" => {
                     check.same_as_reference |= key == "same-as";
@@ -120,44 +119,73 @@ fn check(
             }
         }
     } else {
-        check.equals = limit(value, context);
+        check.equals = limit(metric, "equals", value, context);
     }
     let bounded = check.at_least.is_some() || check.at_most.is_some() || check.equals.is_some();
-    let compares = check.same_as_reference || check.no_more_than_reference;
-    let holds_by_itself = !bounded && !compares && reference.is_some() && is_flag(metric);
-    if holds_by_itself {
+    if !bounded && metric.unit == Unit::Flag && !check.same_as_reference {
+        // Naming what a property is compared with says that it must hold.
         check.equals = Some(Limit::Flag(true));
     }
-    if context.problems.len() == before && !bounded && !compares && !holds_by_itself {
-        let message = format!("the check of `{metric}` has no limit");
-        let help = "give `at-least`, `at-most`, `equals`, `same-as` or `no-more-than`";
-        context.problems.push(Diagnostic::error(entry.key, message).help(help));
+    if context.problems.len() == before {
+        context.problems.extend(incomplete(metric, entry, &check, reference.is_some()));
     }
     // The name of the step is the recipe's affair; the task has an input of this name.
     check.reference = reference.map(|_| "reference".to_owned());
     (context.problems.len() == before).then_some((check, reference))
 }
 
-fn is_flag(metric: &str) -> bool {
-    metric == "groups-kept"
+/// What a check lacks.
+fn incomplete(metric: &MetricDef, entry: &Entry, check: &Check, compared: bool) -> Option<Diagnostic> {
+    let name = metric.name;
+    if metric.needs == Needs::Reference && !compared {
+        let message = format!("the check of `{name}` does not say what to compare with");
+        let help = format!("write {name} = {{ to = \"STEP\", … }}");
+        return Some(Diagnostic::error(entry.key, message).help(help));
+    }
+    let bounded = check.at_least.is_some() || check.at_most.is_some() || check.equals.is_some();
+    if !bounded && !check.same_as_reference && !check.no_more_than_reference {
+        let message = format!("the check of `{name}` has no limit");
+        let help = "give `at-least`, `at-most`, `equals`, `same-as` or `no-more-than`";
+        return Some(Diagnostic::error(entry.key, message).help(help));
+    }
+    None
 }
 
-fn limit(value: &Tree, context: &mut CaseContext<'_>) -> Option<Limit> {
+fn limit(metric: &MetricDef, key: &str, value: &Tree, context: &mut CaseContext<'_>) -> Option<Limit> {
     let limit = match &value.value {
         Node::Bool(flag) => Some(Limit::Flag(*flag)),
         Node::Number(_) => value.as_number().filter(|number| number.is_finite()).map(Limit::Number),
         Node::Text(text) => percent(text).map(Limit::Percent),
         Node::Date(_) | Node::List(_) | Node::Table(_) | Node::File(_) => None,
     };
-    if limit.is_none() {
-        let written = match &value.value {
-            Node::Text(text) => format!("\"{text}\""),
-            other => other.kind().to_owned(),
-        };
-        let message = format!("a limit is a number, a percent such as \"2%\", true or false, got {written}");
-        context.problems.push(Diagnostic::error(value.span, message));
+    let wanted = match metric.unit {
+        Unit::Flag => "true or false",
+        Unit::Length => "a number in mesh units or a percent of the diagonal such as \"2%\"",
+        Unit::Share => "a number from 0 to 1 or a percent such as \"75%\"",
+        Unit::Count => "a whole number",
+        Unit::Degrees => "a number of degrees",
+        Unit::Area | Unit::Volume | Unit::Ratio => "a number",
+    };
+    let fits = match limit {
+        Some(Limit::Flag(_)) => metric.unit == Unit::Flag && key == "equals",
+        Some(Limit::Percent(_)) => matches!(metric.unit, Unit::Length | Unit::Share),
+        Some(Limit::Number(_)) => metric.unit != Unit::Flag,
+        None => false,
+    };
+    if fits {
+        return limit;
     }
-    limit
+    let written = match (&value.value, limit) {
+        (_, Some(Limit::Percent(percent))) => format!("{percent}%"),
+        (_, Some(Limit::Number(number))) => number.to_string(),
+        (_, Some(Limit::Flag(flag))) => flag.to_string(),
+        (Node::Text(text), None) => format!("\"{text}\""),
+        (other, None) => other.kind().to_owned(),
+    };
+    let wanted = if metric.unit == Unit::Flag && key != "equals" { "only for numbers" } else { wanted };
+    let message = format!("`{key}` of `{}` is {wanted}, got {written}", metric.name);
+    context.problems.push(Diagnostic::error(value.span, message));
+    None
 }
 
 fn percent(text: &str) -> Option<f64> {

@@ -6,7 +6,6 @@
 mod bind;
 mod build;
 mod case;
-pub mod gate;
 mod gates;
 pub mod key;
 pub mod merge;
@@ -28,7 +27,6 @@ use petgraph::visit::EdgeRef;
 pub use bind::LOCK_KEYS;
 pub use build::{plan, plan_cases};
 pub use case::{CaseSpec, Context};
-pub use gate::{Check, Limit};
 pub use gates::CHECK_KEYS;
 pub use key::{Change, ContentHash, Key, Record, task_key, task_record};
 pub use merge::PlanBuilder;

@@ -4,7 +4,7 @@ use std::fmt;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use super::gate::Check;
+use crate::metric::gate::Check;
 use crate::step::{BoundStep, Locks, StepDef};
 
 /// A task of a [`Plan`](super::Plan).

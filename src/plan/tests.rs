@@ -1,3 +1,5 @@
+//! Planning with the toy catalog: graph, merging, checks, keys.
+
 use std::path::Path;
 
 use super::*;
@@ -36,7 +38,6 @@ fn context() -> Context<'static> {
         catalog: toy::CATALOG,
         check_file: &|path| if path.ends_with("missing.stl") { Err("no such file".to_owned()) } else { Ok(()) },
         endings: &["stl", "vtu", "inp"],
-        metrics: &["min-stretch", "max-size", "distance", "closed", "groups-kept", "euler-characteristic"],
     }
 }
 

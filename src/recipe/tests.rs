@@ -1,3 +1,5 @@
+//! Loading, merging, parameters and substitution; texts of any sort never panic.
+
 use std::collections::BTreeMap;
 
 use proptest::prelude::*;

@@ -1,3 +1,5 @@
+//! Values and errors of expressions.
+
 use super::*;
 
 fn value(text: &str) -> Result<Value, ExpressionError> {
