@@ -8,4 +8,5 @@ pub mod recipe;
 pub mod step;
 pub mod steps;
 pub mod store;
+pub mod technique;
 pub mod watch;

@@ -1,0 +1,142 @@
+//! Which nodes to split: by curvature, by region, and with the distribution of density kept.
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+use super::front::Front;
+use crate::mesh::hierarchy::{Hierarchy, Node, NodeId};
+use crate::mesh::id::{IdVec, VertexId};
+use crate::watch::{Cancelled, Watch};
+
+/// The element size asked for at each node; infinite where any will do.
+pub type Thresholds = IdVec<Node, f64>;
+
+/// Sizes that shrink with curvature: `largest · (1 − min(κ / κ_p, 1))^gamma`, where `κ_p` is the given share of all
+/// leaves' curvatures (0.95: the 95th percentile).
+///
+/// The paper divides by the largest curvature of the mesh; one crease or noise spike then flattens all the rest, which
+/// is why a percentile is used here.
+pub fn curvature_thresholds(hierarchy: &Hierarchy, largest: f64, share: f64, gamma: f64) -> Thresholds {
+    let mut sorted: Vec<f64> = hierarchy.curvature.iter().take(hierarchy.leaf_count()).copied().collect();
+    sorted.sort_by(f64::total_cmp);
+    let at = ((sorted.len() as f64 - 1.0) * share.clamp(0.0, 1.0)).round() as usize;
+    let peak = sorted.get(at).copied().unwrap_or(0.0);
+    let size = |kappa: f64| {
+        let relative = if peak > 0.0 { (kappa / peak).min(1.0) } else { 0.0 };
+        largest * libm::pow(1.0 - relative, gamma)
+    };
+    hierarchy.curvature.iter().map(|&kappa| size(kappa)).collect()
+}
+
+/// The size of the finest wish among a node's leaves: `size(leaf)` is the size wanted there, infinite for none.
+///
+/// The paper hands a wish down to the nearest child only; with the forest at hand the leaves themselves say what they
+/// want, so a region keeps its shape however coarse the front is that it is asked on.
+pub fn region_thresholds(hierarchy: &Hierarchy, size: impl Fn(VertexId) -> f64) -> Thresholds {
+    let mut wanted: Thresholds = IdVec::filled(f64::INFINITY, hierarchy.node_count());
+    for node in hierarchy.nodes() {
+        wanted[node] = match hierarchy.merge(node) {
+            Some(merge) => wanted[merge.kept].min(wanted[merge.removed]),
+            None => size(VertexId::from_raw(node.raw())),
+        };
+    }
+    wanted
+}
+
+impl Front<'_> {
+    /// Splits, coarsest first, until no node on the front has elements larger than its threshold.
+    pub fn refine_to(&mut self, thresholds: &Thresholds, watch: &Watch) -> Result<(), Cancelled> {
+        let sizes = &self.hierarchy().element_size;
+        let mut queue: BinaryHeap<NodeId> = self.nodes().collect();
+        let mut splits = 0_u64;
+        while let Some(node) = queue.pop() {
+            if !self.contains(node) || sizes[node] <= thresholds[node] {
+                continue;
+            }
+            for split in self.force_split(node) {
+                if let Some(merge) = self.hierarchy().merge(split) {
+                    queue.extend([merge.kept, merge.removed]);
+                }
+                splits += 1;
+            }
+            if splits.is_multiple_of(1024) {
+                watch.check()?;
+                watch.advance(splits, || format!("{} faces", self.face_count()));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Moves a front to another face count with the distribution of element sizes kept.
+///
+/// Every node has a reference size: its own on the starting front, below it that of its ancestor on the front, above it
+/// the mean of its children's. Merging the node whose size relative to that is smallest, or splitting the largest,
+/// keeps the ratio uniform over the mesh.
+#[derive(Clone, Debug)]
+pub struct Density {
+    ratio: IdVec<Node, f64>,
+}
+
+/// A ratio as a sortable key; ratios are finite and not negative.
+fn key(ratio: f64) -> u64 {
+    ratio.to_bits()
+}
+
+impl Density {
+    /// Remembers the distribution on this front.
+    pub fn of(front: &Front<'_>) -> Self {
+        let hierarchy = front.hierarchy();
+        let sizes = &hierarchy.element_size;
+        let stands = front.representatives();
+        let mut reference: IdVec<Node, f64> = IdVec::filled(0.0, hierarchy.node_count());
+        for node in hierarchy.nodes() {
+            reference[node] = match (stands[node], hierarchy.merge(node)) {
+                (Some(on_front), _) => sizes[on_front],
+                (None, Some(merge)) => 0.5 * (reference[merge.kept] + reference[merge.removed]),
+                (None, None) => sizes[node],
+            };
+        }
+        let ratio = |n: NodeId| if reference[n] > 0.0 { sizes[n] / reference[n] } else { 0.0 };
+        Self { ratio: hierarchy.nodes().map(ratio).collect() }
+    }
+
+    /// Splits or merges until the front has `faces` faces, or the next operation would overshoot by more than it nears.
+    pub fn move_to(&self, front: &mut Front<'_>, faces: usize, watch: &Watch) -> Result<(), Cancelled> {
+        if front.face_count() < faces { self.refine(front, faces, watch) } else { self.coarsen(front, faces, watch) }
+    }
+
+    fn refine(&self, front: &mut Front<'_>, faces: usize, watch: &Watch) -> Result<(), Cancelled> {
+        let mut queue: BinaryHeap<(u64, Reverse<NodeId>)> =
+            front.nodes().map(|n| (key(self.ratio[n]), Reverse(n))).collect();
+        while front.face_count() < faces {
+            let Some((_, Reverse(node))) = queue.pop() else { break };
+            watch.check()?;
+            if !front.contains(node) {
+                continue;
+            }
+            for split in front.force_split(node) {
+                if let Some(merge) = front.hierarchy().merge(split) {
+                    queue.extend([merge.kept, merge.removed].map(|n| (key(self.ratio[n]), Reverse(n))));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn coarsen(&self, front: &mut Front<'_>, faces: usize, watch: &Watch) -> Result<(), Cancelled> {
+        let parents = |front: &Front<'_>, n: NodeId| front.parent(n).map(|p| (Reverse(key(self.ratio[p])), Reverse(p)));
+        let mut queue: BinaryHeap<_> = front.nodes().filter_map(|n| parents(front, n)).collect();
+        while front.face_count() > faces {
+            let Some((_, Reverse(node))) = queue.pop() else { break };
+            watch.check()?;
+            if front.contains(node) {
+                continue;
+            }
+            for merged in front.force_merge(node) {
+                queue.extend(parents(front, merged));
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,3 @@
+//! What several steps share: algorithms on surfaces that are no step of their own.
+
+pub mod hierarchy;
