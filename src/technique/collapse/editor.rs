@@ -1,0 +1,436 @@
+//! Guarded edits: a workshop whose changes keep the thresholds, the tolerance and the embedding.
+//!
+//! Topology and freedom are checked by [`crate::mesh::edit`]; then, cheapest first: shape thresholds, foldover, the
+//! tolerance (quadrics, or the certified distance), and last new self-intersections. An edit that passes is applied at
+//! once; one that does not leaves no trace. Stretch and size of every live face are kept up to date beside the mesh.
+
+use glam::DVec3;
+use rustc_hash::FxHashMap;
+
+use super::collision::Collision;
+use super::keeper::Keeper;
+use super::limits::Limits;
+use super::placement::{Order, Site};
+use super::priority::{Priority, Tally};
+use crate::mesh::edit::collapse::Ring;
+use crate::mesh::edit::{CollapsePlan, Placement, check_collapse, collapse};
+use crate::mesh::geometry::{area_vector, stretch, triangle_size};
+use crate::mesh::halfedge::{HalfedgeMesh, edge_of, halfedge_of, twin};
+use crate::mesh::{EdgeId, FaceId, Freedom, VertexId};
+use crate::technique::quadric::Quadric;
+
+/// Faces may turn by at most 45 degrees in one edit.
+const LEAST_TURN_COSINE: f64 = std::f64::consts::FRAC_1_SQRT_2;
+
+/// A face below this stretch has no normal that other faces should be held against.
+const HAS_NORMAL: f64 = 0.05;
+
+/// What a collapse must keep besides tolerance and embedding.
+#[derive(Clone, Copy, Debug)]
+pub struct CollapseRules {
+    /// Least stretch of the new faces; where a face of the old star is below it, no less than that one.
+    pub min_stretch: f64,
+    /// Whether the least stretch of the star must rise.
+    pub must_improve: bool,
+    /// Candidate order.
+    pub order: Order,
+    /// The index of an admitted collapse.
+    pub priority: Priority,
+}
+
+/// What was done, and why edits were refused.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Counts {
+    /// Collapses applied.
+    pub collapses: usize,
+    /// Flips applied.
+    pub flips: usize,
+    /// Splits applied.
+    pub splits: usize,
+    /// Vertices moved.
+    pub moves: usize,
+    /// Edits refused by the certified distance.
+    pub beyond_tolerance: usize,
+    /// Edits refused because faces would intersect.
+    pub collisions: usize,
+}
+
+/// The faces of one edit.
+#[derive(Debug, Default)]
+pub(super) struct Patch {
+    pub(super) old: Vec<FaceId>,
+    /// Successors: their number where they have one already.
+    pub(super) ids: Vec<FaceId>,
+    pub(super) corners: Vec<[VertexId; 3]>,
+    pub(super) points: Vec<[DVec3; 3]>,
+    beside: Vec<FaceId>,
+    beside_points: Vec<[DVec3; 3]>,
+}
+
+impl Patch {
+    pub(super) fn clear(&mut self) {
+        self.old.clear();
+        self.ids.clear();
+        self.corners.clear();
+        self.points.clear();
+    }
+}
+
+/// Plane and line quadrics of the vertices, about a local origin.
+#[derive(Debug, Default)]
+struct Quadrics {
+    origin: DVec3,
+    planes: Vec<Quadric>,
+    lines: FxHashMap<VertexId, Quadric>,
+}
+
+/// A workshop with guards.
+#[derive(Debug)]
+pub struct Editor<'a> {
+    pub(super) mesh: HalfedgeMesh,
+    pub(super) keeper: Keeper<'a>,
+    pub(super) limits: Limits,
+    pub(super) counts: Counts,
+    collision: Collision,
+    quadrics: Quadrics,
+    stretch: Vec<f32>,
+    size: Vec<f32>,
+    pub(super) patch: Patch,
+    ring: Ring,
+}
+
+impl<'a> Editor<'a> {
+    /// A guarded workshop. `feature_weight` is the weight of the sharpest marked edges in the quadrics.
+    pub fn new(mesh: HalfedgeMesh, keeper: Keeper<'a>, limits: Limits, feature_weight: f64) -> Self {
+        let mut this = Self {
+            collision: Collision::new(&mesh),
+            quadrics: Quadrics::new(&mesh, feature_weight),
+            stretch: vec![0.0; mesh.face_slots()],
+            size: vec![0.0; mesh.face_slots()],
+            mesh,
+            keeper,
+            limits,
+            counts: Counts::default(),
+            patch: Patch::default(),
+            ring: Ring::new(),
+        };
+        let faces: Vec<FaceId> = this.mesh.faces().collect();
+        for f in faces {
+            this.remember_shape(f);
+        }
+        this
+    }
+
+    /// The mesh as it stands.
+    pub fn mesh(&self) -> &HalfedgeMesh {
+        &self.mesh
+    }
+
+    /// What was done so far.
+    pub fn counts(&self) -> Counts {
+        self.counts
+    }
+
+    /// The thresholds.
+    pub fn limits(&self) -> &Limits {
+        &self.limits
+    }
+
+    /// Ends the work.
+    pub fn into_mesh(self) -> HalfedgeMesh {
+        self.mesh
+    }
+
+    /// The stretch of a live face.
+    #[inline]
+    pub fn stretch(&self, f: FaceId) -> f64 {
+        f64::from(self.stretch[f.index()])
+    }
+
+    /// The size of a live face.
+    #[inline]
+    pub fn size(&self, f: FaceId) -> f64 {
+        f64::from(self.size[f.index()])
+    }
+
+    fn remember_shape(&mut self, f: FaceId) {
+        let corners = self.mesh.corner_points(f);
+        if f.index() >= self.stretch.len() {
+            self.stretch.resize(f.index() + 1, 0.0);
+            self.size.resize(f.index() + 1, 0.0);
+        }
+        self.stretch[f.index()] = stretch(corners) as f32;
+        self.size[f.index()] = triangle_size(corners) as f32;
+    }
+
+    /// The index of the edge's collapse where cheap tests admit one; `None` where not.
+    pub fn rate_collapse(&mut self, edge: EdgeId, rules: &CollapseRules) -> Option<f32> {
+        let plan = check_collapse(&self.mesh, edge).ok()?;
+        let (site, before) = self.prepare_collapse(&plan)?;
+        let found = site.candidates(rules.order).find_map(|p| self.assess(&plan, &site, &before, p, rules));
+        found.map(|after| rules.priority.index(&before, &after))
+    }
+
+    /// Collapses the edge where all tests admit it; the first candidate that passes wins.
+    pub fn try_collapse(&mut self, edge: EdgeId, rules: &CollapseRules) -> Option<VertexId> {
+        let plan = check_collapse(&self.mesh, edge).ok()?;
+        let (site, before) = self.prepare_collapse(&plan)?;
+        let mut last = None;
+        for p in site.candidates(rules.order) {
+            let p = plan.placement.nearest(p);
+            if last == Some(p) || self.assess(&plan, &site, &before, p, rules).is_none() {
+                continue;
+            }
+            last = Some(p);
+            if self.curve_admits(&plan, p) && self.patch_admitted() {
+                self.apply_collapse(&plan, p);
+                return Some(plan.kept);
+            }
+        }
+        None
+    }
+
+    /// Fills the patch with the star of the edge; the merged vertex's corner comes first in each new face.
+    fn prepare_collapse(&mut self, plan: &CollapsePlan) -> Option<(Site, Tally)> {
+        let mesh = &self.mesh;
+        plan.ring(mesh, &mut self.ring);
+        let valence = plan.new_valence(mesh);
+        let allowed = self.limits.max_valence.max(mesh.valence(plan.removed)).max(mesh.valence(plan.kept));
+        if valence > allowed || self.ring.is_empty() {
+            return None;
+        }
+        let mut before = Tally::new();
+        self.patch.clear();
+        for f in plan.removed_faces(mesh).into_iter().flatten() {
+            self.patch.old.push(f);
+        }
+        for (f, corners) in plan.new_star(mesh) {
+            self.patch.old.push(f);
+            self.patch.ids.push(f);
+            self.patch.corners.push(corners);
+            self.patch.points.push(corners.map(|v| mesh.point(v)));
+        }
+        for f in &self.patch.old {
+            before.add(f64::from(self.stretch[f.index()]), f64::from(self.size[f.index()]));
+        }
+        let centroid = self.ring.iter().map(|&v| mesh.point(v)).sum::<DVec3>() / self.ring.len() as f64;
+        let site = Site {
+            placement: plan.placement,
+            ends: [mesh.point(plan.removed), mesh.point(plan.kept)],
+            centroid,
+            planes: self.quadrics.planes(plan.removed).plus(&self.quadrics.planes(plan.kept)),
+            lines: self.quadrics.lines(plan.removed).plus(&self.quadrics.lines(plan.kept)),
+            origin: self.quadrics.origin,
+        };
+        Some((site, before))
+    }
+
+    /// The new star's tally with the merged vertex at `p`, where quadrics, thresholds and foldover admit it.
+    fn assess(
+        &mut self,
+        plan: &CollapsePlan,
+        site: &Site,
+        before: &Tally,
+        p: DVec3,
+        rules: &CollapseRules,
+    ) -> Option<Tally> {
+        let p = plan.placement.nearest(p);
+        if !p.is_finite() || !self.keeper.admits_point(site, p) {
+            return None;
+        }
+        let floor = rules.min_stretch.min(before.stretch_min);
+        let ceiling = if self.limits.max_size.is_unlimited() {
+            f64::INFINITY
+        } else {
+            self.limits.max_size.at(p).max(before.size_max)
+        };
+        let mut after = Tally::new();
+        for points in &mut self.patch.points {
+            points[0] = p;
+            let (shape, size) = (stretch(*points), triangle_size(*points));
+            if shape < floor || size > ceiling || shape <= 0.0 {
+                return None;
+            }
+            after.add(shape, size);
+        }
+        let improves = !rules.must_improve || after.stretch_min > before.stretch_min;
+        (improves && !self.folds()).then_some(after)
+    }
+
+    /// Whether a face of the patch turns too far: against itself where it has a normal, else against the old star.
+    pub(super) fn folds(&self) -> bool {
+        let patch = &self.patch;
+        let normal_of = |f: FaceId| area_vector(self.mesh.corner_points(f));
+        let agree = |m: DVec3, n: DVec3| {
+            let scale = (m.length_squared() * n.length_squared()).sqrt();
+            scale > 0.0 && m.dot(n) >= LEAST_TURN_COSINE * scale
+        };
+        let is_good = |f: FaceId| self.stretch(f) >= HAS_NORMAL;
+        patch.ids.iter().zip(&patch.points).any(|(&f, points)| {
+            let normal = area_vector(*points);
+            if is_good(f) {
+                return !agree(normal, normal_of(f));
+            }
+            let mut good = patch.old.iter().filter(|&&g| is_good(g)).peekable();
+            if good.peek().is_some() {
+                return !good.any(|&g| agree(normal, normal_of(g)));
+            }
+            normal.dot(patch.old.iter().map(|&g| normal_of(g)).sum()) <= 0.0
+        })
+    }
+
+    /// Whether the curve through the edge stays near the reference's curves.
+    fn curve_admits(&self, plan: &CollapsePlan, p: DVec3) -> bool {
+        let Keeper::Distance { curves, .. } = &self.keeper else { return true };
+        if self.mesh.edge_freedom(edge_of(plan.halfedge)) != Freedom::OnCurve {
+            return true;
+        }
+        let edge = edge_of(plan.halfedge);
+        [plan.halfedge, twin(plan.halfedge)].into_iter().all(|h| {
+            self.mesh
+                .outgoing_from(h)
+                .filter(|&out| edge_of(out) != edge && self.mesh.edge_freedom(edge_of(out)) != Freedom::Free)
+                .all(|out| {
+                    // At a kept corner other curves end; they do not move.
+                    let at = self.mesh.point(self.mesh.origin(out));
+                    at == p || curves.admit([p, self.mesh.point(self.mesh.target(out))])
+                })
+        })
+    }
+
+    /// The costly tests: certified distance both ways, then self-intersection.
+    pub(super) fn patch_admitted(&mut self) -> bool {
+        let mut patch = std::mem::take(&mut self.patch);
+        let admitted = self.costly_tests(&mut patch);
+        self.patch = patch;
+        admitted
+    }
+
+    fn costly_tests(&mut self, patch: &mut Patch) -> bool {
+        if let Keeper::Distance { envelope, .. } = &mut self.keeper {
+            patch.beside.clear();
+            for &f in &patch.old {
+                let first = self.mesh.face_halfedge(f);
+                for h in [first, self.mesh.next(first), self.mesh.prev(first)] {
+                    let other = self.mesh.face(twin(h)).filter(|g| !patch.old.contains(g));
+                    patch.beside.extend(other);
+                }
+            }
+            patch.beside_points.clear();
+            patch.beside_points.extend(patch.beside.iter().map(|&f| self.mesh.corner_points(f)));
+            if !envelope.admits(&patch.old, &patch.points, &patch.beside_points) {
+                self.counts.beyond_tolerance += 1;
+                return false;
+            }
+        }
+        if self.collision.hits(&self.mesh, &patch.old, &patch.points) {
+            self.counts.collisions += 1;
+            return false;
+        }
+        true
+    }
+
+    fn apply_collapse(&mut self, plan: &CollapsePlan, p: DVec3) {
+        collapse(&mut self.mesh, plan, p);
+        self.quadrics.merge(plan.removed, plan.kept);
+        self.counts.collapses += 1;
+        self.settle();
+    }
+
+    /// After an edit was applied: everything beside the mesh follows. The patch's `ids` must name all new faces.
+    pub(super) fn settle(&mut self) {
+        let mut patch = std::mem::take(&mut self.patch);
+        if let Keeper::Distance { envelope, .. } = &mut self.keeper {
+            let successors = patch.ids.len();
+            patch.ids.extend_from_slice(&patch.beside);
+            envelope.commit(&patch.old, &patch.ids);
+            patch.ids.truncate(successors);
+        }
+        let sibling = patch.old[0];
+        for &f in &patch.ids {
+            self.remember_shape(f);
+            self.collision.update(&self.mesh, f, sibling);
+        }
+        self.collision.tidy(&self.mesh);
+        self.patch = patch;
+    }
+
+    /// Gives a vertex that a split has made the planes of the faces it was made in.
+    pub(super) fn found_quadric(&mut self, v: VertexId) {
+        self.quadrics.found(&self.mesh, v);
+    }
+
+    /// Whether the collapse of an edge may place its vertex anywhere.
+    pub fn is_free_edge(&self, edge: EdgeId) -> bool {
+        check_collapse(&self.mesh, edge).is_ok_and(|plan| plan.placement == Placement::Anywhere)
+    }
+}
+
+impl Quadrics {
+    fn new(mesh: &HalfedgeMesh, feature_weight: f64) -> Self {
+        let bounds = crate::mesh::geometry::Aabb::of(mesh.vertices().map(|v| mesh.point(v)));
+        let origin = if bounds.is_empty() { DVec3::ZERO } else { bounds.centre() };
+        let mut this = Self { origin, planes: vec![Quadric::default(); mesh.vertex_slots()], lines: FxHashMap::default() };
+        for f in mesh.faces() {
+            if let Some(plane) = this.plane(mesh, f) {
+                for v in mesh.corners(f) {
+                    this.planes[v.index()].add(&plane);
+                }
+            }
+        }
+        for e in mesh.edges().filter(|&e| mesh.edge_freedom(e) != Freedom::Free) {
+            let [a, b] = mesh.ends(e);
+            let (p, q) = (mesh.point(a) - origin, mesh.point(b) - origin);
+            if let Some(direction) = (q - p).try_normalize() {
+                let line = Quadric::line(direction, p, feature_weight * sharpness(mesh, e));
+                this.lines.entry(a).or_default().add(&line);
+                this.lines.entry(b).or_default().add(&line);
+            }
+        }
+        this
+    }
+
+    fn plane(&self, mesh: &HalfedgeMesh, f: FaceId) -> Option<Quadric> {
+        let corners = mesh.corner_points(f).map(|p| p - self.origin);
+        area_vector(corners).try_normalize().map(|n| Quadric::plane(n, corners[0]))
+    }
+
+    fn planes(&self, v: VertexId) -> Quadric {
+        self.planes[v.index()]
+    }
+
+    fn lines(&self, v: VertexId) -> Quadric {
+        self.lines.get(&v).copied().unwrap_or_default()
+    }
+
+    fn merge(&mut self, gone: VertexId, kept: VertexId) {
+        let planes = self.planes[gone.index()];
+        self.planes[kept.index()].add(&planes);
+        if let Some(lines) = self.lines.remove(&gone) {
+            self.lines.entry(kept).or_default().add(&lines);
+        }
+    }
+
+    fn found(&mut self, mesh: &HalfedgeMesh, v: VertexId) {
+        if v.index() >= self.planes.len() {
+            self.planes.resize(v.index() + 1, Quadric::default());
+        }
+        let mut sum = Quadric::default();
+        for f in mesh.faces_around(v) {
+            if let Some(plane) = self.plane(mesh, f) {
+                sum.add(&plane);
+            }
+        }
+        self.planes[v.index()] = sum;
+    }
+}
+
+/// Half of 1 − n·m: 0 where flat, 1 where folded; never below 0.05, so that flat marked edges hold too; 1 on rims.
+fn sharpness(mesh: &HalfedgeMesh, e: EdgeId) -> f64 {
+    let h = halfedge_of(e);
+    let normal = |side| mesh.face(side).and_then(|f| area_vector(mesh.corner_points(f)).try_normalize());
+    match (normal(h), normal(twin(h))) {
+        (Some(m), Some(n)) => (0.5 * (1.0 - m.dot(n))).max(0.05),
+        _ => 1.0,
+    }
+}

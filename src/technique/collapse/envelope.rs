@@ -1,0 +1,343 @@
+//! Certified two-sided distance: no edit takes the surface further than the tolerance from the reference, or leaves a
+//! part of the reference further than that from the surface.
+//!
+//! The set of points within `ε` of a triangle is convex. So a triangle whose three corners lie within `ε` of one
+//! triangle lies within `ε` of it as a whole.
+//! - **Reference to surface.** The reference is cut into pieces; each is owned by one live face, in whose offset its
+//!   corners lie. An edit must find an owner among the new faces, or those next to them, for every piece of the faces
+//!   that it replaces; a piece that no single face covers is bisected, down to a small part of `ε`.
+//! - **Surface to reference.** Each new face is bisected in the same way until every part lies in the offset of one
+//!   triangle of the reference, found by its box hierarchy, or within `ε` by the Lipschitz bound of its centroid.
+//!
+//! Both are local and exact up to rounding, for which 2 % of the tolerance are held back; so the surface as a whole
+//! keeps the tolerance at every moment. Where the input broke it at the beginning, no edit makes that worse.
+//! Related: Hu et al., Error-Bounded and Feature Preserving Surface Remeshing with Minimal Angle Improvement, TVCG 2017,
+//! which bounds samples; pieces need no sampling density, and a flat part needs few.
+//! Cost: a few pieces a face on flat parts, about `l/ε` of them along each edge of length `l`; 84 bytes each.
+
+use glam::DVec3;
+
+use crate::mesh::bvh::TriangleBvh;
+use crate::mesh::geometry::closest_on_triangle;
+use crate::mesh::halfedge::HalfedgeMesh;
+use crate::mesh::{FaceId, Surface};
+
+const NONE: u32 = u32::MAX;
+
+/// Held back for rounding, and so that the next step with the same tolerance finds room.
+const MARGIN: f64 = 0.98;
+
+/// Pieces are bisected down to this part of the tolerance.
+const FINEST: f64 = 1.0 / 16.0;
+
+/// Parts that one check may look at before it gives up and refuses the edit.
+const CHECK_BUDGET: usize = 3000;
+
+type Triangle = [DVec3; 3];
+
+/// The tolerance zone of a reference, and who covers which piece of it.
+#[derive(Debug)]
+pub struct Envelope<'a> {
+    reference: &'a Surface,
+    tree: &'a TriangleBvh,
+    reach: f64,
+    finest: f64,
+    pieces: Vec<Piece>,
+    free: Vec<u32>,
+    /// First piece of each face slot.
+    head: Vec<u32>,
+    /// Pieces that no face covered when the envelope was made.
+    uncovered: usize,
+    hint: usize,
+    stack: Vec<Triangle>,
+    plan: Plan,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Piece {
+    corners: Triangle,
+    /// 0: the envelope's; else the distance at which its owner was, beyond the tolerance.
+    reach: f32,
+    next: u32,
+}
+
+/// New owners found by the last check: indices into the list of targets.
+#[derive(Debug, Default)]
+struct Plan {
+    kept: Vec<(u32, u32)>,
+    retired: Vec<u32>,
+    parts: Vec<(Piece, u32)>,
+}
+
+impl<'a> Envelope<'a> {
+    /// The zone of `tolerance` round the reference, covered by the faces of `mesh`, whose hierarchy is `own`.
+    pub fn new(
+        reference: &'a Surface,
+        tree: &'a TriangleBvh,
+        tolerance: f64,
+        mesh: &HalfedgeMesh,
+        own: &TriangleBvh,
+        face_of: &[FaceId],
+    ) -> Self {
+        let reach = MARGIN * tolerance;
+        let mut this = Self {
+            reference,
+            tree,
+            reach,
+            finest: FINEST * reach,
+            pieces: Vec::new(),
+            free: Vec::new(),
+            head: vec![NONE; mesh.face_slots()],
+            uncovered: 0,
+            hint: 0,
+            stack: Vec::new(),
+            plan: Plan::default(),
+        };
+        this.cover(mesh, own, face_of, tolerance);
+        this
+    }
+
+    /// Pieces of the reference that were further than the tolerance from the surface at the beginning.
+    pub fn uncovered(&self) -> usize {
+        self.uncovered
+    }
+
+    /// The distance that edits keep.
+    pub fn reach(&self) -> f64 {
+        self.reach
+    }
+
+    /// The point of the reference nearest to `p`, and the face it lies on.
+    pub fn project(&self, p: DVec3) -> Option<(DVec3, FaceId)> {
+        self.tree.closest(p).map(|c| (c.nearest.point, c.face()))
+    }
+
+    /// Whether `p` lies within the tolerance.
+    pub fn contains(&self, p: DVec3) -> bool {
+        self.tree.closest_within(p, self.reach * self.reach).is_some()
+    }
+
+    /// Finds an owner for each piece of the reference, whatever its distance.
+    fn cover(&mut self, mesh: &HalfedgeMesh, own: &TriangleBvh, face_of: &[FaceId], tolerance: f64) {
+        let budget = 4_000_000 + 16 * (self.reference.faces.len() + mesh.face_count());
+        let mut stack: Vec<Triangle> = Vec::new();
+        let mut hint = FaceId::from_raw(0);
+        for f in self.reference.faces.ids() {
+            stack.push(self.reference.corners(f));
+            while let Some(corners) = stack.pop() {
+                if mesh.face_slots() > hint.index() && covers(&mesh.corner_points(hint), &corners, self.reach) {
+                    self.own(hint, corners, 0.0);
+                    continue;
+                }
+                let (centre, radius) = ball(&corners);
+                let Some(closest) = own.closest(centre) else { return };
+                let owner = face_of[closest.index as usize];
+                if covers(&mesh.corner_points(owner), &corners, self.reach) {
+                    hint = owner;
+                    self.own(owner, corners, 0.0);
+                    continue;
+                }
+                let distance = closest.distance();
+                let (longest, parts) = bisect(&corners);
+                let hopeless = distance - radius > self.reach || self.pieces.len() > budget;
+                if longest > self.finest && !hopeless {
+                    stack.extend(parts);
+                    continue;
+                }
+                let bound = distance + radius;
+                self.uncovered += usize::from(bound > tolerance);
+                self.own(owner, corners, (bound * 1.0001) as f32);
+            }
+        }
+    }
+
+    fn own(&mut self, owner: FaceId, corners: Triangle, reach: f32) {
+        let piece = Piece { corners, reach, next: NONE };
+        self.link(owner, piece);
+    }
+
+    fn link(&mut self, owner: FaceId, mut piece: Piece) {
+        piece.next = self.head[owner.index()];
+        let at = if let Some(at) = self.free.pop() {
+            self.pieces[at as usize] = piece;
+            at
+        } else {
+            self.pieces.push(piece);
+            self.pieces.len() as u32 - 1
+        };
+        self.head[owner.index()] = at;
+    }
+
+    /// Whether the edit keeps the tolerance both ways.
+    ///
+    /// `old` are the faces replaced, `new` their successors; `beside` are faces next to them that stay. On `true`, the
+    /// new owners wait for [`Envelope::commit`].
+    pub fn admits(&mut self, old: &[FaceId], new: &[Triangle], beside: &[Triangle]) -> bool {
+        new.iter().all(|face| self.is_within(face)) && self.is_covered(old, new, beside)
+    }
+
+    /// Whether a triangle lies within the tolerance of the reference.
+    fn is_within(&mut self, face: &Triangle) -> bool {
+        self.stack.clear();
+        self.stack.push(*face);
+        let squared = self.reach * self.reach;
+        let mut budget = CHECK_BUDGET;
+        while let Some(part) = self.stack.pop() {
+            if self.hint < self.reference.faces.len()
+                && covers(&self.reference.corners(FaceId::new(self.hint)), &part, self.reach)
+            {
+                continue;
+            }
+            let (centre, radius) = ball(&part);
+            let Some(closest) = self.tree.closest_within(centre, squared) else { return false };
+            self.hint = closest.index as usize;
+            if closest.distance() + radius <= self.reach
+                || covers(&self.reference.corners(closest.face()), &part, self.reach)
+            {
+                continue;
+            }
+            let (longest, parts) = bisect(&part);
+            if longest <= self.finest || budget == 0 {
+                return false;
+            }
+            budget -= 1;
+            self.stack.extend(parts);
+        }
+        true
+    }
+
+    /// Whether every piece of the old faces finds a new owner.
+    fn is_covered(&mut self, old: &[FaceId], new: &[Triangle], beside: &[Triangle]) -> bool {
+        let mut plan = std::mem::take(&mut self.plan);
+        plan.kept.clear();
+        plan.retired.clear();
+        plan.parts.clear();
+        let mut budget = CHECK_BUDGET;
+        let covered = old.iter().all(|face| {
+            let mut at = self.head[face.index()];
+            while at != NONE {
+                let piece = self.pieces[at as usize];
+                let reach = self.reach_of(&piece);
+                if let Some(target) = find_owner(&piece.corners, new, beside, reach) {
+                    plan.kept.push((at, target));
+                } else if self.split(piece, new, beside, &mut plan, &mut budget) {
+                    plan.retired.push(at);
+                } else {
+                    return false;
+                }
+                at = piece.next;
+            }
+            true
+        });
+        self.plan = plan;
+        covered
+    }
+
+    fn reach_of(&self, piece: &Piece) -> f64 {
+        self.reach.max(f64::from(piece.reach))
+    }
+
+    /// Bisects a piece until each part has an owner.
+    fn split(
+        &mut self,
+        piece: Piece,
+        new: &[Triangle],
+        beside: &[Triangle],
+        plan: &mut Plan,
+        budget: &mut usize,
+    ) -> bool {
+        let reach = self.reach_of(&piece);
+        let squared = reach * reach;
+        self.stack.clear();
+        self.stack.push(piece.corners);
+        while let Some(corners) = self.stack.pop() {
+            if let Some(target) = find_owner(&corners, new, beside, reach) {
+                plan.parts.push((Piece { corners, ..piece }, target));
+                continue;
+            }
+            let (centre, radius) = ball(&corners);
+            let (target, distance_squared) = nearest(centre, new, beside);
+            if distance_squared > squared {
+                return false;
+            }
+            if distance_squared.sqrt() + radius <= reach {
+                plan.parts.push((Piece { corners, ..piece }, target));
+                continue;
+            }
+            let (longest, parts) = bisect(&corners);
+            if longest <= self.finest || *budget == 0 {
+                return false;
+            }
+            *budget -= 1;
+            self.stack.extend(parts);
+        }
+        true
+    }
+
+    /// Makes the owners found by the last check that said `true` the owners; `targets` are the faces in the order of
+    /// `new`, then of `beside`.
+    pub fn commit(&mut self, old: &[FaceId], targets: &[FaceId]) {
+        let most = targets.iter().map(|f| f.index() + 1).max().unwrap_or(0);
+        if most > self.head.len() {
+            self.head.resize(most, NONE);
+        }
+        for face in old {
+            self.head[face.index()] = NONE;
+        }
+        let mut plan = std::mem::take(&mut self.plan);
+        for (piece, target) in plan.kept.drain(..) {
+            let owner = targets[target as usize].index();
+            self.pieces[piece as usize].next = self.head[owner];
+            self.head[owner] = piece;
+        }
+        self.free.append(&mut plan.retired);
+        for (piece, target) in plan.parts.drain(..) {
+            self.link(targets[target as usize], piece);
+        }
+        self.plan = plan;
+    }
+}
+
+/// Whether all corners of `part` lie within `reach` of `face`: then all of `part` does.
+fn covers(face: &Triangle, part: &Triangle, reach: f64) -> bool {
+    let squared = reach * reach;
+    part.iter().all(|&p| closest_on_triangle(p, *face).distance_squared <= squared)
+}
+
+/// The first triangle that covers the part; indices run through `new`, then `beside`.
+fn find_owner(part: &Triangle, new: &[Triangle], beside: &[Triangle], reach: f64) -> Option<u32> {
+    new.iter().chain(beside).position(|face| covers(face, part, reach)).map(|at| at as u32)
+}
+
+fn nearest(p: DVec3, new: &[Triangle], beside: &[Triangle]) -> (u32, f64) {
+    let mut best = (0, f64::INFINITY);
+    for (at, face) in new.iter().chain(beside).enumerate() {
+        let squared = closest_on_triangle(p, *face).distance_squared;
+        if squared < best.1 {
+            best = (at as u32, squared);
+        }
+    }
+    best
+}
+
+/// The centroid and the distance of the furthest corner from it.
+fn ball(&[a, b, c]: &Triangle) -> (DVec3, f64) {
+    let centre = (a + b + c) / 3.0;
+    let squared = |p: DVec3| (p - centre).length_squared();
+    (centre, squared(a).max(squared(b)).max(squared(c)).sqrt())
+}
+
+/// The longest side, and the two halves that its midpoint makes.
+fn bisect(&[a, b, c]: &Triangle) -> (f64, [Triangle; 2]) {
+    let (ab, bc, ca) = ((b - a).length_squared(), (c - b).length_squared(), (a - c).length_squared());
+    if ab >= bc && ab >= ca {
+        let m = 0.5 * (a + b);
+        (ab.sqrt(), [[a, m, c], [m, b, c]])
+    } else if bc >= ca {
+        let m = 0.5 * (b + c);
+        (bc.sqrt(), [[b, m, a], [m, c, a]])
+    } else {
+        let m = 0.5 * (c + a);
+        (ca.sqrt(), [[c, m, b], [m, a, b]])
+    }
+}

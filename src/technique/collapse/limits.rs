@@ -1,0 +1,63 @@
+//! Thresholds on elements: what the faces round a changed vertex must keep.
+
+use glam::DVec3;
+
+use crate::mesh::bvh::TriangleBvh;
+use crate::mesh::{Surface, VertexId};
+
+/// A length that may vary over the surface.
+#[derive(Clone, Debug)]
+pub enum SizeField {
+    /// The same everywhere; infinite where there is no limit.
+    Uniform(f64),
+    /// Values at the corners of the faces of a surface, interpolated at its nearest point.
+    Varying {
+        /// The faces that the values belong to.
+        tree: TriangleBvh,
+        /// Three values a face.
+        values: Vec<[f64; 3]>,
+    },
+}
+
+impl SizeField {
+    /// A field with three values a face of `surface`.
+    pub fn varying(surface: &Surface, values: Vec<[f64; 3]>) -> Self {
+        Self::Varying { tree: TriangleBvh::of_surface(surface), values }
+    }
+
+    /// The length at a point.
+    pub fn at(&self, p: DVec3) -> f64 {
+        match self {
+            Self::Uniform(length) => *length,
+            Self::Varying { tree, values } => tree.closest(p).map_or(f64::INFINITY, |c| {
+                let (at, weights) = (values[c.index as usize], c.nearest.weights);
+                at[0] * weights[0] + at[1] * weights[1] + at[2] * weights[2]
+            }),
+        }
+    }
+
+    /// Whether there is no limit anywhere.
+    pub fn is_unlimited(&self) -> bool {
+        matches!(self, Self::Uniform(length) if *length == f64::INFINITY)
+    }
+}
+
+/// The thresholds C2 to C4 of Date et al.
+#[derive(Clone, Debug)]
+pub struct Limits {
+    /// Faces have at least this stretch.
+    pub min_stretch: f64,
+    /// Faces have no longer side than this.
+    pub max_size: SizeField,
+    /// Vertices have at most this many edges.
+    pub max_valence: usize,
+}
+
+/// A face as an edit would make it.
+#[derive(Clone, Copy, Debug)]
+pub struct NewFace {
+    /// Its corners' numbers; a vertex that is yet to come has the number of one that is there.
+    pub vertices: [VertexId; 3],
+    /// Its corners.
+    pub points: [DVec3; 3],
+}
