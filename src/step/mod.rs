@@ -8,6 +8,7 @@ pub mod failure;
 pub mod length;
 pub mod locks;
 pub mod parameters;
+pub mod sizing;
 
 use std::sync::Arc;
 
@@ -19,6 +20,7 @@ pub use artifact::{Artifact, FileBytes, Port};
 pub use failure::{ElementRef, FailureKind, StepFailure};
 pub use length::{Angle, Length, Share, Sizing};
 pub use locks::{Boundary, Locks};
+pub use sizing::ResolvedSizing;
 
 use crate::watch::Watch;
 

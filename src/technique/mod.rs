@@ -4,3 +4,4 @@ pub mod hierarchy;
 pub mod collapse;
 pub mod heap;
 pub mod quadric;
+pub mod remesh;

@@ -57,18 +57,18 @@ pub struct Counts {
 
 /// The faces of one edit.
 #[derive(Debug, Default)]
-pub(super) struct Patch {
-    pub(super) old: Vec<FaceId>,
+pub(in crate::technique) struct Patch {
+    pub(in crate::technique) old: Vec<FaceId>,
     /// Successors: their number where they have one already.
-    pub(super) ids: Vec<FaceId>,
-    pub(super) corners: Vec<[VertexId; 3]>,
-    pub(super) points: Vec<[DVec3; 3]>,
+    pub(in crate::technique) ids: Vec<FaceId>,
+    pub(in crate::technique) corners: Vec<[VertexId; 3]>,
+    pub(in crate::technique) points: Vec<[DVec3; 3]>,
     beside: Vec<FaceId>,
     beside_points: Vec<[DVec3; 3]>,
 }
 
 impl Patch {
-    pub(super) fn clear(&mut self) {
+    pub(in crate::technique) fn clear(&mut self) {
         self.old.clear();
         self.ids.clear();
         self.corners.clear();
@@ -87,15 +87,15 @@ struct Quadrics {
 /// A workshop with guards.
 #[derive(Debug)]
 pub struct Editor<'a> {
-    pub(super) mesh: HalfedgeMesh,
-    pub(super) keeper: Keeper<'a>,
-    pub(super) limits: Limits,
-    pub(super) counts: Counts,
+    pub(in crate::technique) mesh: HalfedgeMesh,
+    pub(in crate::technique) keeper: Keeper<'a>,
+    pub(in crate::technique) limits: Limits,
+    pub(in crate::technique) counts: Counts,
     collision: Collision,
     quadrics: Quadrics,
     stretch: Vec<f32>,
     size: Vec<f32>,
-    pub(super) patch: Patch,
+    pub(in crate::technique) patch: Patch,
     ring: Ring,
 }
 
@@ -235,7 +235,7 @@ impl<'a> Editor<'a> {
         rules: &CollapseRules,
     ) -> Option<Tally> {
         let p = plan.placement.nearest(p);
-        if !p.is_finite() || !self.keeper.admits_point(site, p) {
+        if !p.is_finite() || !self.keeper.admits_point(&site.planes, &site.lines, p - site.origin) {
             return None;
         }
         let floor = rules.min_stretch.min(before.stretch_min);
@@ -258,7 +258,7 @@ impl<'a> Editor<'a> {
     }
 
     /// Whether a face of the patch turns too far: against itself where it has a normal, else against the old star.
-    pub(super) fn folds(&self) -> bool {
+    pub(in crate::technique) fn folds(&self) -> bool {
         let patch = &self.patch;
         let normal_of = |f: FaceId| area_vector(self.mesh.corner_points(f));
         let agree = |m: DVec3, n: DVec3| {
@@ -299,7 +299,7 @@ impl<'a> Editor<'a> {
     }
 
     /// The costly tests: certified distance both ways, then self-intersection.
-    pub(super) fn patch_admitted(&mut self) -> bool {
+    pub(in crate::technique) fn patch_admitted(&mut self) -> bool {
         let mut patch = std::mem::take(&mut self.patch);
         let admitted = self.costly_tests(&mut patch);
         self.patch = patch;
@@ -338,7 +338,7 @@ impl<'a> Editor<'a> {
     }
 
     /// After an edit was applied: everything beside the mesh follows. The patch's `ids` must name all new faces.
-    pub(super) fn settle(&mut self) {
+    pub(in crate::technique) fn settle(&mut self) {
         let mut patch = std::mem::take(&mut self.patch);
         if let Keeper::Distance { envelope, .. } = &mut self.keeper {
             let successors = patch.ids.len();
@@ -356,8 +356,14 @@ impl<'a> Editor<'a> {
     }
 
     /// Gives a vertex that a split has made the planes of the faces it was made in.
-    pub(super) fn found_quadric(&mut self, v: VertexId) {
+    pub(in crate::technique) fn found_quadric(&mut self, v: VertexId) {
         self.quadrics.found(&self.mesh, v);
+    }
+
+    /// Whether the vertex may lie at `p`, as far as quadrics say.
+    pub(in crate::technique) fn quadrics_admit(&self, v: VertexId, p: DVec3) -> bool {
+        let (planes, lines) = (self.quadrics.planes(v), self.quadrics.lines(v));
+        self.keeper.admits_point(&planes, &lines, p - self.quadrics.origin)
     }
 
     /// Whether the collapse of an edge may place its vertex anywhere.

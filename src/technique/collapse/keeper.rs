@@ -8,9 +8,9 @@
 use glam::DVec3;
 
 use super::envelope::Envelope;
-use super::placement::Site;
 use crate::mesh::bvh::SegmentBvh;
 use crate::mesh::geometry::closest_on_segment;
+use crate::technique::quadric::Quadric;
 
 /// The meaning of the tolerance, with its value.
 #[derive(Debug)]
@@ -37,20 +37,30 @@ pub enum Keeper<'a> {
 }
 
 impl Keeper<'_> {
-    /// Whether the merged vertex of a collapse may lie at `p`, as far as quadrics say.
-    pub fn admits_point(&self, site: &Site, p: DVec3) -> bool {
-        let x = p - site.origin;
+    /// Whether a vertex with these planes and lines may lie at `x` (about the same origin), as far as quadrics say.
+    pub fn admits_point(&self, planes: &Quadric, lines: &Quadric, x: DVec3) -> bool {
         match *self {
-            Self::QuadricSum { most, weight } => {
-                site.planes.eval(x) <= most && site.lines.eval(x) <= most * weight
-            }
+            Self::QuadricSum { most, weight } => planes.eval(x) <= most && lines.eval(x) <= most * weight,
             Self::QuadricRms { most } => {
                 let mean = |sum: f64, count: f64| if count > 0.0 { sum / count } else { 0.0 };
                 let squared = most * most;
-                mean(site.planes.eval(x), site.planes.trace()) <= squared
-                    && mean(site.lines.eval(x), site.lines.trace() / 2.0) <= squared
+                mean(planes.eval(x), planes.trace()) <= squared
+                    && mean(lines.eval(x), lines.trace() / 2.0) <= squared
             }
             Self::Distance { .. } => true,
+        }
+    }
+
+    /// Whether the tolerance is the certified distance.
+    pub fn is_certified(&self) -> bool {
+        matches!(self, Self::Distance { .. })
+    }
+
+    /// The point of the reference nearest to `p`, where the tolerance has a reference.
+    pub fn project(&self, p: DVec3) -> Option<DVec3> {
+        match self {
+            Self::Distance { envelope, .. } => envelope.project(p).map(|(point, _)| point),
+            Self::QuadricSum { .. } | Self::QuadricRms { .. } => None,
         }
     }
 }

@@ -21,6 +21,7 @@ pub mod keeper;
 pub mod limits;
 pub mod placement;
 pub mod priority;
+pub mod session;
 
 use crate::mesh::{EdgeId, VertexId};
 use crate::technique::heap::IndexedHeap;

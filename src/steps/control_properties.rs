@@ -1,0 +1,358 @@
+//! Simplifies a surface under thresholds for error, shape, size and valence.
+//!
+//! Date, Nagai, Hirose, Ohta: High-Quality and Property Controlled Finite Element Mesh Generation From Triangular Meshes
+//! Using the Multiresolution Technique, JCISE 2005, section 5; Date et al., CAD & Applications 2005, section 4.
+//! Phase A changes only what breaks the stretch threshold, until nothing does. Phase B collapses the edges that keep
+//! all thresholds C1 to C4, smallest and best first. With `optimize`, rounds of flips, splits and relaxation go in
+//! between, under the same tests.
+//!
+//! Invariants: topology, marked curves, kept elements; no new self-intersection; no threshold that holds somewhere is
+//! broken there. In `distance` mode the surface stays within the tolerance of the reference, both ways, at every moment.
+//! Cost: O(F log F); `distance` costs several times `quadric-rms`.
+//! Departures: the collapse engine lists them (`technique::collapse`). The thresholds need not hold on the input.
+
+use std::sync::Arc;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::mesh::bvh::TriangleBvh;
+use crate::mesh::halfedge::EnterError;
+use crate::mesh::{FreedomError, LockRules, Surface, resolve_freedom};
+use crate::step::{
+    Artifact, InputDef, Inputs, Length, Locks, OutPort, OutputDef, Port, Produced, ResolvedSizing, Sizing, StepFailure,
+};
+use crate::technique::collapse::session::{Recount, Setup, ToleranceMode, Violation, open, recount};
+use crate::technique::collapse::{
+    CollapseRules, Editor, Ending, Limits, Order, Priority, SizeField, simplify,
+};
+use crate::technique::remesh::{optimise, raise_stretch};
+use crate::watch::{Cancelled, Watch};
+
+/// Simplifies a surface while error, element shape, element size and valence stay within limits.
+///
+/// Use it on a mesh that is finer than wanted, for example after `subdivide`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default, rename_all = "kebab-case")]
+pub struct ControlPropertiesParams {
+    /// How far the result may lie from `reference`; see `tolerance-mode` for its meaning and unit. Default 0.2 % of the
+    /// reference's diagonal.
+    pub tolerance: Length,
+    /// What `tolerance` means. Default `"distance"`. In `"quadric-sum"` it is a squared length, given as a number.
+    pub tolerance_mode: ToleranceMode,
+    /// How far marked curves may move. Default: half of `tolerance` in `distance` mode; other modes do not use it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub feature_tolerance: Option<Length>,
+    /// Least stretch of an element: 1 for the equilateral triangle, 0 for a degenerate one. Default 0.2, the usual
+    /// floor for analysis, which means angles from 7 to 154 degrees.
+    #[schemars(range(min = 0.0, max = 0.95))]
+    pub min_stretch: f64,
+    /// Longest side of an element. Default: no limit.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub max_size: Option<Sizing>,
+    /// Most edges at a vertex. Default 12; 6 is the mean of any closed mesh, so values below 7 leave little freedom.
+    #[schemars(range(min = 6))]
+    pub max_valence: usize,
+    /// Stops when this many faces are left. Default: goes on until no edge is valid.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub target_faces: Option<usize>,
+    /// Weight of the sharpest marked edges in the quadrics that place vertices. Default 100.
+    #[schemars(range(min = 0.0))]
+    pub feature_weight: f64,
+    /// Whether flips, splits and relaxation go in between the collapses. Default: in `distance` mode only; `false` is
+    /// the pure collapse of the papers.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub optimize: Option<bool>,
+}
+
+impl Default for ControlPropertiesParams {
+    fn default() -> Self {
+        Self {
+            tolerance: Length::Percent(0.2),
+            tolerance_mode: ToleranceMode::Distance,
+            feature_tolerance: None,
+            min_stretch: 0.2,
+            max_size: None,
+            max_valence: 12,
+            target_faces: None,
+            feature_weight: 100.0,
+            optimize: None,
+        }
+    }
+}
+
+/// How it ended, counted on the result.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Status {
+    /// All thresholds hold, and no valid edge is left.
+    Satisfied,
+    /// All thresholds hold, and the number of faces asked for is reached.
+    TargetReached,
+    /// A threshold does not hold everywhere, or the number of faces was not reached; `violations` names the faces.
+    Stuck,
+}
+
+/// What property control did. Every figure is counted on the result.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub struct ControlPropertiesStats {
+    /// How it ended.
+    pub status: Status,
+    /// Faces of the input.
+    pub faces_before: usize,
+    /// Faces of the result.
+    pub faces_after: usize,
+    /// Edges collapsed.
+    pub collapses: usize,
+    /// Edges flipped.
+    pub flips: usize,
+    /// Edges split.
+    pub splits: usize,
+    /// Vertices moved.
+    pub moves: usize,
+    /// Edits refused because the surface would have left the tolerance.
+    pub refused_by_tolerance: usize,
+    /// Edits refused because faces would have intersected.
+    pub refused_by_intersection: usize,
+    /// Least stretch.
+    pub min_stretch: f64,
+    /// Mean stretch.
+    pub mean_stretch: f64,
+    /// Longest side, in mesh units.
+    pub max_size: f64,
+    /// Most edges at a vertex.
+    pub max_valence: usize,
+    /// Faces that break a threshold.
+    pub faces_violating: usize,
+    /// Of those, the ones where marked curves meet too sharply or everything is kept.
+    pub faces_excused: usize,
+    /// Vertices with more edges than allowed.
+    pub vertices_over_valence: usize,
+    /// The faces that break a threshold, with the cause; the first 64.
+    pub violations: Vec<Violation>,
+    /// The tolerance in mesh units (their square in `quadric-sum` mode).
+    pub tolerance: f64,
+}
+
+/// Why property control refused.
+#[derive(Debug, thiserror::Error)]
+pub enum ControlPropertiesError {
+    /// The tolerance has no meaning in this mode.
+    #[error("in `quadric-sum` mode `tolerance` is a squared length: a number, not a percent")]
+    PercentOfSquare,
+    /// A threshold is out of range.
+    #[error("{name} must be {range}, got {value}")]
+    OutOfRange {
+        /// The parameter.
+        name: &'static str,
+        /// What it may be.
+        range: &'static str,
+        /// What it is.
+        value: f64,
+    },
+    /// A size names a field or group that is not there.
+    #[error("max-size: {0}")]
+    Size(StepFailure),
+    /// A lock names a group that is not there.
+    #[error(transparent)]
+    Locks(#[from] FreedomError),
+    /// The input is no surface.
+    #[error(transparent)]
+    NotASurface(#[from] EnterError),
+    /// The run was interrupted.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+}
+
+/// What property control works on.
+#[derive(Clone, Copy, Debug)]
+pub struct ControlPropertiesInput<'a> {
+    /// The surface to simplify.
+    pub surface: &'a Surface,
+    /// What the tolerance is measured against.
+    pub reference: &'a Surface,
+    /// What must stay.
+    pub locks: LockRules<'a>,
+}
+
+/// Simplifies `input.surface` under thresholds.
+///
+/// # Errors
+/// [`ControlPropertiesError`]: parameters, groups or fields that do not fit the surface. Thresholds that cannot be
+/// reached are no error; the statistics name the faces.
+pub fn control_properties(
+    input: ControlPropertiesInput<'_>,
+    params: &ControlPropertiesParams,
+    watch: &Watch,
+) -> Result<(Surface, ControlPropertiesStats), ControlPropertiesError> {
+    let freedom = resolve_freedom(input.surface, &input.locks)?;
+    let tree = TriangleBvh::of_surface(input.reference);
+    let setup = setup(&input, params, tree.bounds().diagonal())?;
+    let (tolerance, limits) = (setup.tolerance, setup.limits.clone());
+    let mut editor = open(input.surface, &freedom, input.reference, &tree, setup)?;
+    let ending = run_phases(&mut editor, params, watch)?;
+    let counts = editor.counts();
+    let left = editor.into_mesh().leave();
+    let freedom = resolve_freedom(&left.surface, &input.locks)?;
+    let recount = recount(&left.surface, &freedom, &limits);
+    let status = status(&recount, ending, params.target_faces.is_some());
+    let stats = ControlPropertiesStats {
+        status,
+        faces_before: input.surface.faces.len(),
+        faces_after: left.surface.faces.len(),
+        collapses: counts.collapses,
+        flips: counts.flips,
+        splits: counts.splits,
+        moves: counts.moves,
+        refused_by_tolerance: counts.beyond_tolerance,
+        refused_by_intersection: counts.collisions,
+        min_stretch: recount.min_stretch,
+        mean_stretch: recount.mean_stretch,
+        max_size: recount.max_size,
+        max_valence: recount.max_valence,
+        faces_violating: recount.violations.len(),
+        faces_excused: recount.excused(),
+        vertices_over_valence: recount.over_valence,
+        violations: recount.violations.into_iter().take(64).collect(),
+        tolerance,
+    };
+    Ok((left.surface, stats))
+}
+
+/// Stretch below which optimised collapses do not go while there is anything better to do: twice the usual floor.
+const COMFORT: [f64; 3] = [0.55, 0.45, 0.35];
+
+/// Rounds of flips and relaxation between collapses, and at the end.
+const ROUNDS: [usize; 2] = [2, 8];
+
+fn run_phases(
+    editor: &mut Editor<'_>,
+    params: &ControlPropertiesParams,
+    watch: &Watch,
+) -> Result<Ending, Cancelled> {
+    let is_certified = params.tolerance_mode == ToleranceMode::Distance;
+    let rules = CollapseRules {
+        min_stretch: params.min_stretch,
+        must_improve: false,
+        order: if is_certified { Order::OnSurface } else { Order::Printed },
+        priority: Priority::SmallFirst { size: 1.0 },
+    };
+    let target = params.target_faces.unwrap_or(0);
+    raise_stretch(editor, params.min_stretch, &rules, watch)?;
+    if !params.optimize.unwrap_or(is_certified) {
+        return simplify(editor, &rules, target, watch);
+    }
+    let mut ending = Ending::Exhausted;
+    for comfort in COMFORT {
+        let rules = CollapseRules { min_stretch: comfort.max(params.min_stretch), ..rules };
+        ending = simplify(editor, &rules, target, watch)?;
+        optimise(editor, ROUNDS[0], watch)?;
+        if ending == Ending::Target {
+            break;
+        }
+    }
+    if ending == Ending::Exhausted && target > 0 {
+        ending = simplify(editor, &rules, target, watch)?;
+    }
+    optimise(editor, ROUNDS[1], watch)?;
+    raise_stretch(editor, params.min_stretch, &rules, watch)?;
+    Ok(ending)
+}
+
+fn status(recount: &Recount, ending: Ending, has_target: bool) -> Status {
+    let holds = recount.violations.is_empty() && recount.over_valence == 0;
+    match (holds, ending) {
+        (true, Ending::Target) => Status::TargetReached,
+        (true, Ending::Exhausted) if !has_target => Status::Satisfied,
+        (true | false, _) => Status::Stuck,
+    }
+}
+
+fn setup(
+    input: &ControlPropertiesInput<'_>,
+    params: &ControlPropertiesParams,
+    diagonal: f64,
+) -> Result<Setup, ControlPropertiesError> {
+    let tolerance = match (params.tolerance_mode, params.tolerance) {
+        (ToleranceMode::QuadricSum, Length::Percent(_)) => return Err(ControlPropertiesError::PercentOfSquare),
+        (_, length) => length.resolve(diagonal),
+    };
+    let check = |name, range, value: f64, holds: bool| {
+        if holds { Ok(()) } else { Err(ControlPropertiesError::OutOfRange { name, range, value }) }
+    };
+    check("min-stretch", "from 0 to 0.95", params.min_stretch, (0.0..=0.95).contains(&params.min_stretch))?;
+    check("max-valence", "at least 6", params.max_valence as f64, params.max_valence >= 6)?;
+    check("feature-weight", "finite and not negative", params.feature_weight, params.feature_weight >= 0.0 && params.feature_weight.is_finite())?;
+    let is_length = params.tolerance_mode == ToleranceMode::Distance;
+    check("tolerance", "above 0", tolerance, tolerance > 0.0 || !is_length)?;
+    let feature_tolerance = params.feature_tolerance.map_or(0.5 * tolerance, |length| length.resolve(diagonal));
+    let max_size = match &params.max_size {
+        None => SizeField::Uniform(f64::INFINITY),
+        Some(sizing) => match sizing.resolve(input.surface, diagonal).map_err(ControlPropertiesError::Size)? {
+            ResolvedSizing::Uniform(length) => SizeField::Uniform(length),
+            ResolvedSizing::Corners(values) => SizeField::varying(input.surface, values),
+        },
+    };
+    let limits = Limits { min_stretch: params.min_stretch, max_size, max_valence: params.max_valence };
+    Ok(Setup {
+        mode: params.tolerance_mode,
+        tolerance,
+        feature_tolerance,
+        feature_weight: params.feature_weight,
+        limits,
+    })
+}
+
+impl From<ControlPropertiesError> for StepFailure {
+    fn from(error: ControlPropertiesError) -> Self {
+        let message = error.to_string();
+        match error {
+            ControlPropertiesError::Cancelled(cancelled) => cancelled.into(),
+            ControlPropertiesError::PercentOfSquare => Self::failed(message)
+                .with_help("give a number in squared mesh units, or use `tolerance-mode = \"quadric-rms\"`"),
+            ControlPropertiesError::Size(failure) => Self { message, ..failure },
+            ControlPropertiesError::NotASurface(_) => Self::bad_input(message).with_help("run `repair` first"),
+            ControlPropertiesError::OutOfRange { .. } | ControlPropertiesError::Locks(_) => Self::failed(message),
+        }
+    }
+}
+
+/// The room's entry in the catalog.
+pub struct Step;
+
+impl crate::step::Step for Step {
+    const NAME: &'static str = "control-properties";
+    const REVISION: u32 = 1;
+    const INPUTS: &'static [InputDef] = &[
+        InputDef { name: "from", accepts: &[Port::Surface], required: true, doc: "the surface to simplify" },
+        InputDef {
+            name: "reference",
+            accepts: &[Port::Surface],
+            required: false,
+            doc: "what the tolerance is measured against; default: `from`",
+        },
+    ];
+    const OUTPUTS: &'static [OutputDef] = &[OutputDef { name: "main", port: OutPort::Is(Port::Surface) }];
+    const EDITS: bool = true;
+    const CARRIES: &'static str = "Maps groups, regions, marks, pins and seams; drops fields.";
+    const EXAMPLE: &'static str =
+        "use = \"control-properties\"\nfrom = \"clean\"\nmin-stretch = 0.2\nmax-size = \"4%\"\nmax-valence = 10\ntolerance = \"0.2%\"\n";
+
+    type Params = ControlPropertiesParams;
+    type Stats = ControlPropertiesStats;
+
+    fn run(
+        inputs: &Inputs,
+        _output: &str,
+        params: &ControlPropertiesParams,
+        locks: &Locks,
+        watch: &Watch,
+    ) -> Result<Produced<ControlPropertiesStats>, StepFailure> {
+        let surface = inputs.surface("from")?;
+        let reference = inputs.surface_opt("reference")?.unwrap_or(surface);
+        let input = ControlPropertiesInput { surface, reference, locks: locks.rules() };
+        let (surface, stats) = control_properties(input, params, watch)?;
+        Ok(Produced { artifact: Artifact::Surface(Arc::new(surface)), stats })
+    }
+}

@@ -1,0 +1,191 @@
+//! Flip, split and relocation under the same guards as a collapse.
+
+use glam::DVec3;
+
+use crate::mesh::edit::{check_flip, check_relocate, check_split, flip, relocate, split};
+use crate::mesh::geometry::{area_vector, stretch, triangle_size};
+use crate::mesh::halfedge::{halfedge_of, twin};
+use crate::mesh::{EdgeId, FaceId, VertexId};
+use crate::technique::collapse::Editor;
+use crate::technique::collapse::priority::Tally;
+
+/// Without a certified distance, an edge is flipped only where its faces differ by less than 5 degrees.
+const FLAT_COSINE: f64 = 0.996;
+
+/// When an edit is worth it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Gain {
+    /// The least stretch rises.
+    LeastStretch,
+    /// The product of least and mean stretch rises, and the least does not fall below the threshold.
+    Quality,
+    /// Nothing asked, except that no face falls below the threshold.
+    None,
+}
+
+impl Editor<'_> {
+    /// Flips the edge where all tests admit it and it gains.
+    pub fn try_flip(&mut self, edge: EdgeId, gain: Gain) -> bool {
+        let Ok(plan) = check_flip(&self.mesh, edge) else { return false };
+        let h = halfedge_of(edge);
+        let (Some(left), Some(right)) = (self.mesh.face(h), self.mesh.face(twin(h))) else { return false };
+        if !self.flip_keeps_valence(plan.ends, plan.apexes, gain) {
+            return false;
+        }
+        let before = self.tally(&[left, right]);
+        self.patch.clear();
+        self.patch.old.extend([left, right]);
+        self.patch.ids.extend([left, right]);
+        for corners in plan.new_faces() {
+            let points = corners.map(|v| self.mesh.point(v));
+            self.patch.corners.push(corners);
+            self.patch.points.push(points);
+        }
+        let normals = [left, right].map(|f| area_vector(self.mesh.corner_points(f)));
+        let flat = normals[0].dot(normals[1]) >= FLAT_COSINE * (normals[0].length() * normals[1].length());
+        if !(flat || self.keeper.is_certified()) || !self.gains(&before, gain) || self.flip_folds(normals) {
+            return false;
+        }
+        if !self.patch_admitted() {
+            return false;
+        }
+        flip(&mut self.mesh, &plan);
+        self.counts.flips += 1;
+        self.settle();
+        true
+    }
+
+    /// Valences move towards 6, or at least no apex gets more edges than allowed.
+    fn flip_keeps_valence(&self, ends: [VertexId; 2], apexes: [VertexId; 2], gain: Gain) -> bool {
+        let valence = |v: VertexId| self.mesh.valence(v) as i64;
+        let least = |v: VertexId| if self.mesh.is_boundary_vertex(v) { 2 } else { 3 };
+        if ends.iter().any(|&v| valence(v) <= least(v)) {
+            return false;
+        }
+        let most = self.limits.max_valence as i64;
+        let tallest = ends.map(valence).into_iter().max().unwrap_or(0);
+        gain == Gain::LeastStretch && apexes.iter().all(|&v| valence(v) < most.max(tallest))
+            || apexes.iter().all(|&v| valence(v) < most)
+    }
+
+    /// Whether a new face of a flip turns away from both old ones.
+    fn flip_folds(&self, old: [DVec3; 2]) -> bool {
+        let sum = old[0].normalize_or_zero() + old[1].normalize_or_zero();
+        self.patch.points.iter().any(|points| {
+            let normal = area_vector(*points);
+            let cosine = |m: DVec3| normal.dot(m) / (normal.length() * m.length()).max(f64::MIN_POSITIVE);
+            cosine(sum) < std::f64::consts::FRAC_1_SQRT_2
+        })
+    }
+
+    /// Splits the edge at `at` where all tests admit it.
+    pub fn try_split(&mut self, edge: EdgeId, at: DVec3) -> Option<VertexId> {
+        let plan = check_split(&self.mesh, edge).ok()?;
+        let h = halfedge_of(edge);
+        let [i, j] = plan.ends;
+        let at = if plan.is_curve {
+            crate::mesh::edit::Placement::Segment(self.mesh.point(i), self.mesh.point(j)).nearest(at)
+        } else {
+            at
+        };
+        self.patch.clear();
+        let first_new = self.mesh.face_slots();
+        let mut later = Vec::with_capacity(2);
+        for side in [h, twin(h)] {
+            let (Some(face), Some(apex)) = (self.mesh.face(side), self.mesh.apex(side)) else { continue };
+            if self.mesh.valence(apex) >= self.limits.max_valence {
+                return None;
+            }
+            let (from, to) = (self.mesh.origin(side), self.mesh.target(side));
+            let point = |v: VertexId| self.mesh.point(v);
+            self.patch.old.push(face);
+            // The half at the first end keeps the face's number.
+            let halves = [[from, to, apex].map(point), [from, to, apex].map(point)];
+            let [mut near, mut far] = halves;
+            near[1] = at;
+            far[0] = at;
+            let (kept, new) = if from == i { (near, far) } else { (far, near) };
+            self.patch.ids.push(face);
+            self.patch.corners.push([from, to, apex]);
+            self.patch.points.push(kept);
+            later.push((FaceId::new(first_new + later.len()), [from, to, apex], new));
+        }
+        for (id, corners, points) in later {
+            self.patch.ids.push(id);
+            self.patch.corners.push(corners);
+            self.patch.points.push(points);
+        }
+        if self.split_folds() || !self.patch_admitted() {
+            return None;
+        }
+        let v = split(&mut self.mesh, &plan, at);
+        self.found_quadric(v);
+        self.counts.splits += 1;
+        self.settle();
+        Some(v)
+    }
+
+    fn split_folds(&self) -> bool {
+        let patch = &self.patch;
+        let count = patch.old.len();
+        patch.points.iter().enumerate().any(|(at, points)| {
+            let old = area_vector(self.mesh.corner_points(patch.old[at % count]));
+            let new = area_vector(*points);
+            let scale = (old.length_squared() * new.length_squared()).sqrt();
+            old.length_squared() > 0.0 && new.dot(old) < std::f64::consts::FRAC_1_SQRT_2 * scale
+        })
+    }
+
+    /// Moves a free vertex where all tests admit it and it gains.
+    pub fn try_move(&mut self, v: VertexId, to: DVec3, gain: Gain) -> bool {
+        if check_relocate(&self.mesh, v).is_err() || !to.is_finite() || !self.quadrics_admit(v, to) {
+            return false;
+        }
+        self.patch.clear();
+        for f in self.mesh.faces_around(v) {
+            let corners = self.mesh.corners(f);
+            self.patch.old.push(f);
+            self.patch.ids.push(f);
+            self.patch.corners.push(corners);
+            self.patch.points.push(corners.map(|w| if w == v { to } else { self.mesh.point(w) }));
+        }
+        let before = self.tally(&self.patch.old);
+        if !self.gains(&before, gain) || self.folds() || !self.patch_admitted() {
+            return false;
+        }
+        if relocate(&mut self.mesh, v, to).is_err() {
+            return false;
+        }
+        self.counts.moves += 1;
+        self.settle();
+        true
+    }
+
+    /// The tally of live faces.
+    pub fn tally(&self, faces: &[FaceId]) -> Tally {
+        let mut tally = Tally::new();
+        for &f in faces {
+            tally.add(self.stretch(f), self.size(f));
+        }
+        tally
+    }
+
+    /// Whether the patch is worth it, and breaks no threshold that held.
+    fn gains(&self, before: &Tally, gain: Gain) -> bool {
+        let mut after = Tally::new();
+        let limit = &self.limits.max_size;
+        for points in &self.patch.points {
+            let size = triangle_size(*points);
+            if !limit.is_unlimited() && size > limit.at(points[0]).max(before.size_max * (1.0 + 1e-6)) {
+                return false;
+            }
+            after.add(stretch(*points), size);
+        }
+        let floor = self.limits.min_stretch.min(before.stretch_min);
+        match gain {
+            Gain::LeastStretch => after.stretch_min > before.stretch_min * (1.0 + 1e-3),
+            Gain::Quality => after.stretch_min >= floor && after.quality() > before.quality() * (1.0 + 2e-3),
+            Gain::None => after.stretch_min >= floor,
+        }
+    }
+}
