@@ -1,7 +1,7 @@
 //! Resolves a [`Sizing`] on a surface: one length, or lengths at the corners of its faces.
 
-use super::length::Sizing;
 use super::failure::StepFailure;
+use super::length::Sizing;
 use crate::mesh::{Support, Surface};
 
 /// Lengths on a surface.

@@ -23,9 +23,7 @@ use crate::step::{
     Artifact, InputDef, Inputs, Length, Locks, OutPort, OutputDef, Port, Produced, ResolvedSizing, Sizing, StepFailure,
 };
 use crate::technique::collapse::session::{Recount, Setup, ToleranceMode, Violation, open, recount};
-use crate::technique::collapse::{
-    CollapseRules, Editor, Ending, Limits, Order, Priority, SizeField, simplify,
-};
+use crate::technique::collapse::{CollapseRules, Editor, Ending, Limits, Order, Priority, SizeField, simplify};
 use crate::technique::remesh::{optimise, raise_stretch};
 use crate::watch::{Cancelled, Watch};
 
@@ -226,11 +224,7 @@ const COMFORT: [f64; 3] = [0.55, 0.45, 0.35];
 /// Rounds of flips and relaxation between collapses, and at the end.
 const ROUNDS: [usize; 2] = [2, 8];
 
-fn run_phases(
-    editor: &mut Editor<'_>,
-    params: &ControlPropertiesParams,
-    watch: &Watch,
-) -> Result<Ending, Cancelled> {
+fn run_phases(editor: &mut Editor<'_>, params: &ControlPropertiesParams, watch: &Watch) -> Result<Ending, Cancelled> {
     let is_certified = params.tolerance_mode == ToleranceMode::Distance;
     let rules = CollapseRules {
         min_stretch: params.min_stretch,
@@ -283,7 +277,12 @@ fn setup(
     };
     check("min-stretch", "from 0 to 0.95", params.min_stretch, (0.0..=0.95).contains(&params.min_stretch))?;
     check("max-valence", "at least 6", params.max_valence as f64, params.max_valence >= 6)?;
-    check("feature-weight", "finite and not negative", params.feature_weight, params.feature_weight >= 0.0 && params.feature_weight.is_finite())?;
+    check(
+        "feature-weight",
+        "finite and not negative",
+        params.feature_weight,
+        params.feature_weight >= 0.0 && params.feature_weight.is_finite(),
+    )?;
     let is_length = params.tolerance_mode == ToleranceMode::Distance;
     check("tolerance", "above 0", tolerance, tolerance > 0.0 || !is_length)?;
     let feature_tolerance = params.feature_tolerance.map_or(0.5 * tolerance, |length| length.resolve(diagonal));
@@ -336,8 +335,7 @@ impl crate::step::Step for Step {
     const OUTPUTS: &'static [OutputDef] = &[OutputDef { name: "main", port: OutPort::Is(Port::Surface) }];
     const EDITS: bool = true;
     const CARRIES: &'static str = "Maps groups, regions, marks, pins and seams; drops fields.";
-    const EXAMPLE: &'static str =
-        "use = \"control-properties\"\nfrom = \"clean\"\nmin-stretch = 0.2\nmax-size = \"4%\"\nmax-valence = 10\ntolerance = \"0.2%\"\n";
+    const EXAMPLE: &'static str = "use = \"control-properties\"\nfrom = \"clean\"\nmin-stretch = 0.2\nmax-size = \"4%\"\nmax-valence = 10\ntolerance = \"0.2%\"\n";
 
     type Params = ControlPropertiesParams;
     type Stats = ControlPropertiesStats;

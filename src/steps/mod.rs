@@ -1,9 +1,11 @@
 //! The catalog: every step that a recipe can use, one file and one line each.
 
+pub mod control_properties;
 pub mod read;
 pub mod repair;
 
 use crate::step::StepDef;
 
 /// All steps, in the order of the workflow.
-pub static CATALOG: &[StepDef] = &[StepDef::of::<read::Step>(), StepDef::of::<repair::Step>()];
+pub static CATALOG: &[StepDef] =
+    &[StepDef::of::<read::Step>(), StepDef::of::<repair::Step>(), StepDef::of::<control_properties::Step>()];

@@ -63,11 +63,7 @@ impl Quadric {
     /// `A x`.
     fn times(&self, x: DVec3) -> DVec3 {
         let [xx, xy, xz, yy, yz, zz] = self.a;
-        DVec3::new(
-            xx * x.x + xy * x.y + xz * x.z,
-            xy * x.x + yy * x.y + yz * x.z,
-            xz * x.x + yz * x.y + zz * x.z,
-        )
+        DVec3::new(xx * x.x + xy * x.y + xz * x.z, xy * x.x + yy * x.y + yz * x.z, xz * x.x + yz * x.y + zz * x.z)
     }
 
     /// The sum of squared distances of `x`, never negative.

@@ -8,10 +8,10 @@
 
 use glam::{DVec3, Vec3};
 
+use crate::mesh::FaceId;
 use crate::mesh::geometry::Aabb;
 use crate::mesh::halfedge::HalfedgeMesh;
 use crate::mesh::predicate::triangle_triangle;
-use crate::mesh::FaceId;
 
 const NONE: u32 = u32::MAX;
 const LEAF_FACES: usize = 8;

@@ -376,7 +376,8 @@ impl Quadrics {
     fn new(mesh: &HalfedgeMesh, feature_weight: f64) -> Self {
         let bounds = crate::mesh::geometry::Aabb::of(mesh.vertices().map(|v| mesh.point(v)));
         let origin = if bounds.is_empty() { DVec3::ZERO } else { bounds.centre() };
-        let mut this = Self { origin, planes: vec![Quadric::default(); mesh.vertex_slots()], lines: FxHashMap::default() };
+        let mut this =
+            Self { origin, planes: vec![Quadric::default(); mesh.vertex_slots()], lines: FxHashMap::default() };
         for f in mesh.faces() {
             if let Some(plane) = this.plane(mesh, f) {
                 for v in mesh.corners(f) {
