@@ -1,7 +1,7 @@
 //! What several steps share: algorithms on surfaces that are no step of their own.
 
-pub mod hierarchy;
 pub mod collapse;
 pub mod heap;
+pub mod hierarchy;
 pub mod quadric;
 pub mod remesh;

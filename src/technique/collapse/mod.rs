@@ -90,10 +90,11 @@ impl Queue {
             if edge.index().is_multiple_of(4096) {
                 watch.check()?;
             }
-            if editor.mesh().edge_is_live(edge) {
-                if let Some(index) = editor.rate_collapse(edge, rules) {
-                    heap.set(edge.raw(), index);
-                }
+            if !editor.mesh().edge_is_live(edge) {
+                continue;
+            }
+            if let Some(index) = editor.rate_collapse(edge, rules) {
+                heap.set(edge.raw(), index);
             }
         }
         Ok(Self { heap, stale: vec![false; slots], edges: Vec::new() })

@@ -66,10 +66,9 @@ impl Site {
         let [p, q] = self.ends;
         let middle = 0.5 * (p + q);
         match (order, i) {
-            (Order::Printed, 0) => Some(self.centroid),
+            (Order::Printed, 0) | (Order::OnSurface, 1) => Some(self.centroid),
             (Order::Printed, 1) | (Order::OnSurface, 2) => self.optimum(middle),
             (Order::Printed, 2) | (Order::OnSurface, 0) => self.optimum(self.centroid),
-            (Order::OnSurface, 1) => Some(self.centroid),
             (_, 3) => Some(p),
             (_, 4) => Some(q),
             _ => None,
