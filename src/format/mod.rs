@@ -8,8 +8,11 @@ mod binary;
 mod builder;
 mod element;
 mod error;
+mod group_text;
 mod inp;
 mod obj;
+mod off;
+mod ply;
 mod polygon;
 mod sets;
 mod stl;
@@ -35,6 +38,10 @@ pub enum Format {
     Stl,
     /// Wavefront OBJ.
     Obj,
+    /// Polygon file format, Stanford PLY.
+    Ply,
+    /// Geomview's object file format.
+    Off,
     /// VTK XML, unstructured grids and polygonal data.
     Vtu,
     /// Abaqus and CalculiX input.
@@ -62,6 +69,8 @@ pub struct ReadCounts {
     pub polygons_triangulated: usize,
     /// Faces with fewer than three corners, left out.
     pub faces_dropped: usize,
+    /// Fields with a number that is NaN or infinite, left out.
+    pub fields_dropped: usize,
     /// Repeated corners merged into a vertex with identical coordinates (STL, which has no vertex numbers).
     pub corners_welded: usize,
     /// Nodes that only mid-side positions or left-out elements used, left out.
@@ -125,12 +134,15 @@ impl std::fmt::Debug for WriteOptions<'_> {
 
 impl Format {
     /// All formats.
-    pub const ALL: &'static [Self] = &[Self::Stl, Self::Obj, Self::Vtu, Self::Inp];
+    pub const ALL: &'static [Self] =
+        &[Self::Stl, Self::Obj, Self::Ply, Self::Off, Self::Vtu, Self::Inp];
 
     fn def(self) -> &'static FormatDef {
         match self {
             Self::Stl => &stl::DEF,
             Self::Obj => &obj::DEF,
+            Self::Ply => &ply::DEF,
+            Self::Off => &off::DEF,
             Self::Vtu => &vtu::DEF,
             Self::Inp => &inp::DEF,
         }

@@ -3,8 +3,6 @@
 //! Files are bytes, not UTF-8: only words that are numbers or names are ever decoded. A line ends with LF, CR LF or
 //! a lone CR. Numbers are correctly rounded on reading and shortest round trip on writing, so that text loses nothing.
 
-#![expect(dead_code, reason = "the formats that use the rest follow")]
-
 use super::error::{FormatError, Place, Reason};
 
 /// Walks over a text file word by word.
@@ -26,6 +24,12 @@ impl<'a> Scanner<'a> {
     /// Takes everything from `mark` to the end of its line as a comment.
     pub(super) fn with_comments(mut self, mark: u8) -> Self {
         self.comment = Some(mark);
+        self
+    }
+
+    /// Takes comments as text from here on.
+    pub(super) fn without_comments(mut self) -> Self {
+        self.comment = None;
         self
     }
 

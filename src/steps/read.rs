@@ -63,6 +63,8 @@ pub struct ReadStats {
     pub polygons_triangulated: usize,
     /// Faces with fewer than three corners that were left out.
     pub faces_dropped: usize,
+    /// Fields with a number that is NaN or infinite, left out.
+    pub fields_dropped: usize,
     /// Repeated corners merged into a vertex with identical coordinates.
     pub corners_welded: usize,
 }
@@ -143,6 +145,7 @@ fn stats(format: Format, soup: &Soup, counts: ReadCounts) -> ReadStats {
         fields: soup.carried.fields.len(),
         polygons_triangulated: counts.polygons_triangulated,
         faces_dropped: counts.faces_dropped,
+        fields_dropped: counts.fields_dropped,
         corners_welded: counts.corners_welded,
     }
 }
