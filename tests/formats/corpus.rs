@@ -91,13 +91,13 @@ fn binary_off_in_both_byte_orders_with_and_without_colours() {
     for (big, colours) in [(true, true), (true, false), (false, true), (false, false)] {
         let mut file = b"OFF BINARY\n".to_vec();
         let mut push = |raw: u32| file.extend(if big { raw.to_be_bytes() } else { raw.to_le_bytes() });
-        [3, 2, 0].map(&mut push);
-        [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 2.5, 0.0].map(|x: f32| push(x.to_bits()));
+        [3, 2, 0].into_iter().for_each(&mut push);
+        [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 2.5, 0.0].into_iter().for_each(|x: f32| push(x.to_bits()));
         for corners in [[0, 1, 2], [2, 1, 0]] {
             push(3);
-            corners.map(&mut push);
+            corners.into_iter().for_each(&mut push);
             if colours {
-                [3, 0x3f80_0000, 0, 0].map(&mut push);
+                [3, 0x3f80_0000, 0, 0].into_iter().for_each(&mut push);
             }
         }
         let (soup, _) = parse("x.off", &file);

@@ -145,7 +145,7 @@ fn an_untrue_count_is_refused_before_memory_is_taken() {
     assert_eq!(refusal(Format::Stl, &stl), (Place::Byte(84), untrue("facets", 4_294_967_295, 2)));
 
     let off = b"OFF\n4000000000 1 0\n0 0 0\n";
-    assert_eq!(refusal(Format::Off, off), (Place::Line(2), untrue("vertices", 4_000_000_000, 1)));
+    assert_eq!(refusal(Format::Off, off), (Place::Line(2), untrue("vertices", 4_000_000_000, 2)));
     let off = b"OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n2000000000 0 1 2\n";
     assert_eq!(refusal(Format::Off, off), (Place::Line(6), untrue("corners", 2_000_000_000, 4)));
 
