@@ -134,8 +134,7 @@ impl std::fmt::Debug for WriteOptions<'_> {
 
 impl Format {
     /// All formats.
-    pub const ALL: &'static [Self] =
-        &[Self::Stl, Self::Obj, Self::Ply, Self::Off, Self::Vtu, Self::Inp];
+    pub const ALL: &'static [Self] = &[Self::Stl, Self::Obj, Self::Ply, Self::Off, Self::Vtu, Self::Inp];
 
     fn def(self) -> &'static FormatDef {
         match self {
