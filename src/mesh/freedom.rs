@@ -10,7 +10,7 @@ use std::collections::BTreeSet;
 use super::carried::{EdgeKey, Freedom, Groups, MarkCause, edge_key};
 use super::id::{FaceId, IdVec, Vertex, VertexId};
 use super::surface::Surface;
-use rustc_hash::FxHashMap;
+use rustc_hash::{FxHashMap, FxHashSet};
 
 /// What edits may do to the rims of an open surface.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -68,12 +68,21 @@ pub struct ResolvedFreedom {
     /// By vertex.
     pub vertices: IdVec<Vertex, Freedom>,
     edges: FxHashMap<EdgeKey, Freedom>,
+    /// Edges that are kept only because they lie on a seam: all copies may be split alike.
+    seam_edges: FxHashSet<EdgeKey>,
 }
 
 impl ResolvedFreedom {
     /// Everything free: for algorithms on meshes without marks.
     pub fn free(surface: &Surface) -> Self {
-        Self { vertices: IdVec::filled(Freedom::Free, surface.points.len()), edges: FxHashMap::default() }
+        let vertices = IdVec::filled(Freedom::Free, surface.points.len());
+        Self { vertices, ..Self::default() }
+    }
+
+    /// Whether an edge may be halved: seams too, if all copies are halved alike.
+    #[inline]
+    pub fn may_halve(&self, key: EdgeKey) -> bool {
+        self.edge(key) != Freedom::Keep || self.seam_edges.contains(&key)
     }
 
     /// The freedom of an edge.
@@ -134,7 +143,7 @@ impl<'a> Draft<'a> {
     fn marks(&mut self, rim: Rim) {
         for (&edge, mark) in &self.surface.carried.marks {
             match mark.cause {
-                MarkCause::Seam => self.restrict(edge, Freedom::Keep),
+                MarkCause::Seam => {}
                 MarkCause::Boundary if rim == Rim::Free => {}
                 MarkCause::Boundary | MarkCause::Feature | MarkCause::RegionBorder | MarkCause::Locked => {
                     self.restrict(edge, mark.freedom);
@@ -219,7 +228,22 @@ impl<'a> Draft<'a> {
         Ok(())
     }
 
-    fn finish(self) -> ResolvedFreedom {
+    /// Seams come last, to tell the edges that nothing else keeps.
+    fn seams(&mut self) -> FxHashSet<EdgeKey> {
+        let mut halved = FxHashSet::default();
+        for (&edge, mark) in &self.surface.carried.marks {
+            if mark.cause == MarkCause::Seam {
+                if self.edges.get(&edge) != Some(&Freedom::Keep) {
+                    halved.insert(edge);
+                }
+                self.restrict(edge, Freedom::Keep);
+            }
+        }
+        halved
+    }
+
+    fn finish(mut self) -> ResolvedFreedom {
+        let seam_edges = self.seams();
         let mut vertices = self.pins.clone();
         let mut strict: Vec<(EdgeKey, Freedom)> = self.edges.iter().map(|(&edge, &freedom)| (edge, freedom)).collect();
         strict.sort_unstable();
@@ -241,7 +265,7 @@ impl<'a> Draft<'a> {
                 vertices[v] = vertices[v].max(self.on_curves(v, *ends));
             }
         }
-        ResolvedFreedom { vertices, edges: self.edges }
+        ResolvedFreedom { vertices, edges: self.edges, seam_edges }
     }
 
     fn on_curves(&self, v: VertexId, ends: CurveEnds) -> Freedom {

@@ -3,9 +3,14 @@
 pub mod control_properties;
 pub mod read;
 pub mod repair;
+pub mod subdivide;
 
 use crate::step::StepDef;
 
 /// All steps, in the order of the workflow.
-pub static CATALOG: &[StepDef] =
-    &[StepDef::of::<read::Step>(), StepDef::of::<repair::Step>(), StepDef::of::<control_properties::Step>()];
+pub static CATALOG: &[StepDef] = &[
+    StepDef::of::<read::Step>(),
+    StepDef::of::<repair::Step>(),
+    StepDef::of::<subdivide::Step>(),
+    StepDef::of::<control_properties::Step>(),
+];

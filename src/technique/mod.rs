@@ -1,7 +1,9 @@
 //! What several steps share: algorithms on surfaces that are no step of their own.
 
 pub mod collapse;
+pub mod halve_edges;
 pub mod heap;
 pub mod hierarchy;
 pub mod quadric;
+pub mod refine;
 pub mod remesh;
