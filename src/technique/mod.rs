@@ -1,9 +1,10 @@
 //! What several steps share: algorithms on surfaces that are no step of their own.
 
 pub mod collapse;
+pub mod curvature;
+pub mod eigen;
 pub mod halve_edges;
 pub mod heap;
 pub mod hierarchy;
 pub mod quadric;
 pub mod refine;
-pub mod remesh;
