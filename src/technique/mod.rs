@@ -8,3 +8,4 @@ pub mod heap;
 pub mod hierarchy;
 pub mod quadric;
 pub mod refine;
+pub mod remesh;
