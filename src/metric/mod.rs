@@ -1,11 +1,26 @@
 //! The metrics: one definition each, used by steps, gates, sweeps, reports and snapshots.
 
+pub mod distance;
+pub mod feature;
 pub mod gate;
+pub mod intersection;
+pub mod quad_shape;
 pub mod registry;
+pub mod shape;
+pub mod subject;
+pub mod summary;
+pub mod topology;
+pub mod weld;
 
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
+
+use registry::{METRICS, Needs};
+pub use subject::Subject;
+
+use crate::mesh::Soup;
+use crate::watch::{Cancelled, Watch};
 
 /// A table of metrics by name, in kebab-case (`min-stretch`). Values are numbers, flags, or absent where undefined.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -25,4 +40,42 @@ pub enum Value {
     Number(f64),
     /// A property that holds or not.
     Flag(bool),
+}
+
+impl Value {
+    /// The value as a number; a flag is 1 or 0.
+    pub fn as_f64(self) -> f64 {
+        match self {
+            Self::Count(count) => count as f64,
+            Self::Integer(integer) => integer as f64,
+            Self::Number(number) => number,
+            Self::Flag(flag) => f64::from(u8::from(flag)),
+        }
+    }
+}
+
+impl Measurement {
+    /// The value of a metric.
+    pub fn get(&self, name: &str) -> Option<Value> {
+        self.values.get(name).copied()
+    }
+}
+
+/// Measures every metric that is defined: those against a reference only where there is one.
+pub fn measure(mesh: &Soup, reference: Option<&Soup>, watch: &Watch) -> Result<Measurement, Cancelled> {
+    let subject = Subject::new(mesh, reference, watch);
+    let mut values = BTreeMap::new();
+    watch.phase("measure", Some(METRICS.len() as u64));
+    for (done, metric) in METRICS.iter().enumerate() {
+        watch.check()?;
+        watch.advance(done as u64, || metric.name.to_owned());
+        if metric.needs == Needs::Reference && reference.is_none() {
+            continue;
+        }
+        if let Some(value) = (metric.measure)(&subject) {
+            values.insert(metric.name.to_owned(), value);
+        }
+    }
+    watch.check()?;
+    Ok(Measurement { values })
 }

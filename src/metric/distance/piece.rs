@@ -1,0 +1,193 @@
+//! One face against the other mesh: convex pieces are bounded, and cut where the bound is too loose.
+
+use glam::DVec3;
+use smallvec::{SmallVec, smallvec};
+
+use super::Target;
+use crate::mesh::geometry::{area_vector, closest_on_triangle, triangle_size};
+
+/// When a piece is good enough, and how much work a face may cost.
+pub(super) struct Limits {
+    /// A piece with a bound of at most this is not cut.
+    accept: f64,
+    /// A face that reaches more than this is settled.
+    give_up: f64,
+    /// Pieces a face.
+    pieces: usize,
+    /// A piece of a smaller radius is not cut.
+    radius: f64,
+}
+
+/// Pieces over all faces, and the least and most for one: keeps the worst case within a minute.
+const ALL_PIECES: usize = 20_000_000;
+const FEWEST: usize = 256;
+const MOST: usize = 200_000;
+
+impl Limits {
+    pub(super) fn new(accept: f64, give_up: f64, faces: usize, to: &Target) -> Self {
+        let pieces = (ALL_PIECES / faces.max(1)).clamp(FEWEST, MOST);
+        Self { accept, give_up, pieces, radius: 1e-10 * to.bvh.bounds().diagonal() }
+    }
+}
+
+/// What is known of the largest distance of a face.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Bound {
+    /// Not more than this.
+    pub(super) upper: f64,
+    /// At least this.
+    pub(super) lower: f64,
+    /// Where it is reached.
+    pub(super) at: DVec3,
+}
+
+impl Bound {
+    fn reach(&mut self, distance: f64, at: DVec3) {
+        if distance > self.lower {
+            (self.lower, self.at) = (distance, at);
+        }
+    }
+}
+
+/// A corner of a piece with its nearest triangle of the other mesh.
+#[derive(Clone, Copy)]
+struct Corner {
+    point: DVec3,
+    distance_squared: f64,
+    nearest: u32,
+}
+
+type Piece = SmallVec<[Corner; 6]>;
+
+/// The largest distance over `piece` to triangle `t` of the other mesh: it is reached at a corner.
+fn to_triangle(piece: &Piece, to: &Target, t: u32) -> f64 {
+    let triangle = to.triangles[t as usize];
+    let squared = |c: &Corner| closest_on_triangle(c.point, triangle).distance_squared;
+    piece.iter().map(squared).fold(0.0, f64::max).sqrt()
+}
+
+/// The best bound by the triangles nearest to the corners.
+fn bound_by_corners(piece: &Piece, to: &Target) -> f64 {
+    let mut best = f64::INFINITY;
+    for (i, corner) in piece.iter().enumerate() {
+        if piece[..i].iter().all(|c| c.nearest != corner.nearest) {
+            best = best.min(to_triangle(piece, to, corner.nearest));
+        }
+    }
+    best
+}
+
+/// Bounds the largest distance of a face with these corners, each given with its squared distance and nearest triangle.
+pub(super) fn refine(corners: [(DVec3, (f64, u32)); 3], to: &Target, limits: &Limits) -> Bound {
+    let mut bound = Bound { at: corners[0].0, ..Bound::default() };
+    let first: Piece = corners
+        .iter()
+        .map(|&(point, (distance_squared, nearest))| Corner { point, distance_squared, nearest })
+        .collect();
+    for c in &first {
+        bound.reach(c.distance_squared.sqrt(), c.point);
+    }
+    let mut stack: Vec<Piece> = vec![first];
+    let mut seen = 0;
+    while let Some(piece) = stack.pop() {
+        if bound.lower > limits.give_up {
+            break;
+        }
+        seen += 1;
+        let by_corners = bound_by_corners(&piece, to);
+        if by_corners <= limits.accept {
+            bound.upper = bound.upper.max(by_corners);
+            continue;
+        }
+        let centre = piece.iter().map(|c| c.point).sum::<DVec3>() / piece.len() as f64;
+        let radius = piece.iter().map(|c| (c.point - centre).length_squared()).fold(0.0, f64::max).sqrt();
+        let Some(found) = to.bvh.closest(centre) else { break };
+        bound.reach(found.distance(), centre);
+        let best = by_corners.min(found.distance() + radius).min(to_triangle(&piece, to, found.index));
+        if best <= limits.accept || radius <= limits.radius || seen >= limits.pieces {
+            bound.upper = bound.upper.max(best);
+            continue;
+        }
+        for part in cut(&piece, centre, radius, found.index, to, limits) {
+            for c in &part {
+                bound.reach(c.distance_squared.sqrt(), c.point);
+            }
+            stack.push(part);
+        }
+    }
+    bound.upper = bound.upper.max(bound.lower);
+    bound
+}
+
+/// Cuts a piece along the sides of the prism over triangle `t`, where that separates what `t` bounds from what it does
+/// not; else in halves.
+fn cut(piece: &Piece, centre: DVec3, radius: f64, t: u32, to: &Target, limits: &Limits) -> SmallVec<[Piece; 4]> {
+    let triangle = to.triangles[t as usize];
+    let normal = area_vector(triangle);
+    let far = piece
+        .iter()
+        .copied()
+        .filter(|c| closest_on_triangle(c.point, triangle).distance_squared > limits.accept * limits.accept);
+    let far: Piece = far.collect();
+    let mut planes: SmallVec<[(DVec3, DVec3); 3]> = SmallVec::new();
+    for i in 0..3 {
+        let (a, b) = (triangle[i], triangle[(i + 1) % 3]);
+        let outward = (b - a).cross(normal).normalize_or_zero();
+        if far.iter().any(|c| (c.point - a).dot(outward) > 0.0) {
+            planes.push((a, outward));
+        }
+    }
+    // The prism helps where it holds the centre, and is not tiny compared with the piece.
+    let fits = radius <= 2.0 * triangle_size(triangle);
+    let inside = planes.iter().all(|&(a, outward)| (centre - a).dot(outward) < -1e-9 * radius);
+    if planes.is_empty() || !fits || !inside {
+        let farthest = piece.iter().map(|c| c.point - centre);
+        let along = farthest.fold(DVec3::ZERO, |m, d| if d.length_squared() > m.length_squared() { d } else { m });
+        let (left, right) = split(piece, centre, along.normalize_or_zero(), t, to);
+        return smallvec![left, right];
+    }
+    let mut parts = SmallVec::new();
+    let mut rest = piece.clone();
+    for (a, outward) in planes {
+        let (within, beyond) = split(&rest, a, outward, t, to);
+        rest = within;
+        if beyond.len() >= 3 {
+            parts.push(beyond);
+        }
+    }
+    if rest.len() >= 3 {
+        parts.push(rest);
+    }
+    parts
+}
+
+/// Splits a convex piece by a plane: what lies below, and what lies above. Triangle `t` is near the cut and serves as the
+/// first bound of the new corners' queries.
+fn split(piece: &Piece, origin: DVec3, normal: DVec3, t: u32, to: &Target) -> (Piece, Piece) {
+    let (mut below, mut above) = (Piece::new(), Piece::new());
+    for (i, &c) in piece.iter().enumerate() {
+        let d = piece[(i + 1) % piece.len()];
+        let (hc, hd) = ((c.point - origin).dot(normal), (d.point - origin).dot(normal));
+        if hc <= 0.0 {
+            below.push(c);
+        }
+        if hc >= 0.0 {
+            above.push(c);
+        }
+        if hc * hd < 0.0 {
+            let point = c.point + (hc / (hc - hd)) * (d.point - c.point);
+            let corner = corner_at(point, t, to);
+            below.push(corner);
+            above.push(corner);
+        }
+    }
+    (below, above)
+}
+
+fn corner_at(point: DVec3, t: u32, to: &Target) -> Corner {
+    let known = closest_on_triangle(point, to.triangles[t as usize]).distance_squared;
+    match to.bvh.closest_within(point, known) {
+        Some(found) => Corner { point, distance_squared: found.nearest.distance_squared, nearest: found.index },
+        None => Corner { point, distance_squared: known, nearest: t },
+    }
+}

@@ -1,0 +1,296 @@
+//! Judging a mesh by the checks of a gate.
+
+use super::super::distance::{Decision, decide};
+use super::super::registry::{MetricDef, Needs, Unit, find, lost_groups};
+use super::super::{Subject, Value};
+use super::column::{Column, Extreme, column, fault_at};
+use super::{Check, Fault, FaultKind, GateReport, GateRow, Limit, MAX_FAULTS, fault};
+use crate::mesh::{FaceId, Soup};
+use crate::watch::{Cancelled, Watch};
+
+/// Why a gate could not be judged.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum GateError {
+    /// No metric has this name.
+    #[error("there is no metric `{0}`")]
+    UnknownMetric(String),
+    /// The check compares with another mesh, and none was given.
+    #[error("the check of `{0}` needs a mesh to compare with")]
+    NoReference(String),
+    /// The run was interrupted.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+}
+
+/// Computed lengths differ in the last digits from lengths that a step was given: both count as equal.
+const ROUNDING: f64 = 1e-9;
+
+/// A check with its bounds as numbers.
+struct Bounds {
+    at_least: Option<f64>,
+    at_most: Option<f64>,
+    equals: Option<f64>,
+    text: String,
+}
+
+impl Bounds {
+    fn tolerance(bound: f64) -> f64 {
+        ROUNDING * bound.abs()
+    }
+
+    fn admits(&self, value: f64) -> bool {
+        self.at_least.is_none_or(|b| value >= b - Self::tolerance(b))
+            && self.at_most.is_none_or(|b| value <= b + Self::tolerance(b))
+            && self.equals.is_none_or(|b| (value - b).abs() <= Self::tolerance(b))
+    }
+
+    fn slack(&self, value: f64) -> Option<f64> {
+        let slacks = [
+            self.at_least.map(|b| value - b),
+            self.at_most.map(|b| b - value),
+            self.equals.map(|b| -(value - b).abs()),
+        ];
+        slacks.into_iter().flatten().reduce(f64::min).filter(|s| s.is_finite())
+    }
+}
+
+/// Judges a mesh by all checks, in order.
+///
+/// `reference` is the mesh that the checks compare with; percents of lengths are of its diagonal where a check names it.
+pub fn evaluate(
+    mesh: &Soup,
+    reference: Option<&Soup>,
+    checks: &[Check],
+    watch: &Watch,
+) -> Result<GateReport, GateError> {
+    let subject = Subject::new(mesh, reference, watch);
+    let mut report = GateReport::default();
+    for check in checks {
+        let metric = find(&check.metric).ok_or_else(|| GateError::UnknownMetric(check.metric.clone()))?;
+        let compares = metric.needs == Needs::Reference || check.same_as_reference || check.no_more_than_reference;
+        if compares && reference.is_none() {
+            return Err(GateError::NoReference(check.metric.clone()));
+        }
+        report.rows.push(judge(&subject, metric, check)?);
+        watch.check().map_err(GateError::Cancelled)?;
+    }
+    Ok(report)
+}
+
+fn judge(subject: &Subject<'_>, metric: &MetricDef, check: &Check) -> Result<GateRow, GateError> {
+    let bounds = resolve(subject, metric, check);
+    if let (Some(at_most), None, None) = (bounds.at_most, bounds.at_least, bounds.equals)
+        && let Some(sides) = sides(metric.name)
+    {
+        return judge_distance(subject, check, sides, at_most, &bounds);
+    }
+    Ok(match column(subject, metric.name) {
+        Some(column) => judge_column(subject, check, column, &bounds),
+        None => judge_whole(subject, metric, &bounds),
+    })
+}
+
+fn resolve(subject: &Subject<'_>, metric: &MetricDef, check: &Check) -> Bounds {
+    let of_diagonal = match (&check.reference, subject.reference()) {
+        (Some(_), Some(reference)) => reference,
+        _ => subject,
+    };
+    let mut words = Vec::new();
+    let mut number = |relation: &str, limit: Option<Limit>| {
+        let limit = limit?;
+        let (value, text) = match limit {
+            Limit::Number(value) => (value, format!("{relation} {value}")),
+            Limit::Flag(flag) => (f64::from(u8::from(flag)), format!("{relation} {flag}")),
+            Limit::Percent(percent) => {
+                let whole = if metric.unit == Unit::Length { of_diagonal.extent().bounds.diagonal() } else { 1.0 };
+                // As steps resolve their lengths, to the last bit.
+                let value = percent / 100.0 * whole;
+                (value, format!("{relation} {percent}% = {value}"))
+            }
+        };
+        words.push(text.trim_start().to_owned());
+        Some(value)
+    };
+    let at_least = number("at least", check.at_least);
+    let mut at_most = number("at most", check.at_most);
+    let mut equals = number("", check.equals);
+    let theirs = subject.reference().and_then(|r| (metric.measure)(r)).map(Value::as_f64);
+    if check.same_as_reference && metric.needs != Needs::Reference {
+        equals = Some(theirs.unwrap_or(f64::NAN));
+        words.push(format!("the same as the reference{}", theirs.map_or(String::new(), |v| format!(" = {v}"))));
+    }
+    if check.no_more_than_reference && metric.needs != Needs::Reference {
+        let theirs = theirs.unwrap_or(f64::NAN);
+        at_most = Some(at_most.map_or(theirs, |b| b.min(theirs)));
+        words.push(format!("no more than the reference = {theirs}"));
+    }
+    Bounds { at_least, at_most, equals, text: words.join(", ") }
+}
+
+fn row(check: &Check, bounds: &Bounds) -> GateRow {
+    GateRow {
+        metric: check.metric.clone(),
+        limit: bounds.text.clone(),
+        measured: None,
+        passed: false,
+        slack: None,
+        fault_count: 0,
+        faults: Vec::new(),
+        excused: Vec::new(),
+        note: None,
+    }
+}
+
+/// Keeps the worst faults, first those with the largest badness, of equals the lowest id.
+fn worst(mut faults: Vec<Fault>, badness: impl Fn(f64) -> f64) -> (u64, Vec<Fault>) {
+    let count = faults.len() as u64;
+    faults.sort_by(|a, b| badness(b.value).total_cmp(&badness(a.value)).then(a.id.cmp(&b.id)));
+    faults.truncate(MAX_FAULTS);
+    (count, faults)
+}
+
+fn judge_column(subject: &Subject<'_>, check: &Check, column: Column, bounds: &Bounds) -> GateRow {
+    let mut out = row(check, bounds);
+    let except = fault::members(subject.mesh(), &check.except);
+    let skipped = |id: u32| column.kind == FaultKind::Face && except.contains(&id);
+    let needed = (check.metric == "min-stretch").then(|| bounds.at_least.map(fault::angle_needed)).flatten();
+    let mut measured: Option<f64> = None;
+    let (mut faults, mut excused) = (Vec::new(), Vec::new());
+    for (&id, &value) in column.ids.iter().zip(&column.values) {
+        if skipped(id) {
+            continue;
+        }
+        let fails = match column.extreme {
+            Extreme::Least => bounds.at_least.is_some_and(|b| value < b - Bounds::tolerance(b)),
+            Extreme::Largest => bounds.at_most.is_some_and(|b| value > b + Bounds::tolerance(b)),
+        };
+        if fails {
+            let fault = fault_at(subject.mesh(), column.kind, id, value);
+            if needed.is_some_and(|angle| fault::is_excused(subject.mesh(), FaceId::from_raw(id), angle)) {
+                excused.push(fault);
+                continue;
+            }
+            faults.push(fault);
+        }
+        measured = Some(match column.extreme {
+            Extreme::Least => measured.map_or(value, |m| m.min(value)),
+            Extreme::Largest => measured.map_or(value, |m| m.max(value)),
+        });
+    }
+    let badness = |v: f64| if column.extreme == Extreme::Least { -v } else { v };
+    (out.fault_count, out.faults) = worst(faults, badness);
+    let (excused_count, excused) = worst(excused, badness);
+    out.excused = excused;
+    // Without an element there is nothing that could fail.
+    out.passed = measured.is_none_or(|m| bounds.admits(m));
+    out.slack = measured.and_then(|m| bounds.slack(m));
+    let whole = column.kind == FaultKind::Vertex;
+    let number = |m: f64| if whole { Value::Count(m as u64) } else { Value::Number(m) };
+    out.measured = measured.filter(|m| m.is_finite()).map(number);
+    out.note = note_of(excused_count, needed, measured.is_none(), except.len());
+    out
+}
+
+fn note_of(excused: u64, needed: Option<f64>, nothing: bool, except: usize) -> Option<String> {
+    let mut notes = Vec::new();
+    if let (1.., Some(angle)) = (excused, needed) {
+        let faces = if excused == 1 { "1 face is excused" } else { &format!("{excused} faces are excused") };
+        notes.push(format!(
+            "{faces}: marked edges meet there at less than {:.2} degrees, where no triangle reaches this stretch",
+            angle.to_degrees()
+        ));
+    }
+    if except > 0 {
+        notes.push(format!("{except} faces are in the groups excepted"));
+    }
+    if nothing {
+        notes.push("there is no element to judge".to_owned());
+    }
+    (!notes.is_empty()).then(|| notes.join("; "))
+}
+
+fn judge_whole(subject: &Subject<'_>, metric: &MetricDef, bounds: &Bounds) -> GateRow {
+    let check = Check { metric: metric.name.to_owned(), ..Check::default() };
+    let mut out = row(&check, bounds);
+    out.measured = (metric.measure)(subject);
+    let value = out.measured.map(Value::as_f64);
+    let nothing = match metric.needs {
+        Needs::Triangles => subject.triangles().faces.is_empty(),
+        Needs::Quads => subject.quads().faces.is_empty(),
+        Needs::Mesh | Needs::Reference => false,
+    };
+    out.passed = value.map_or(nothing, |v| bounds.admits(v));
+    out.slack = value.and_then(|v| bounds.slack(v)).filter(|_| metric.unit != Unit::Flag);
+    if nothing {
+        out.note = Some("there is no element to judge".to_owned());
+    } else if out.measured.is_none() {
+        out.note = Some("undefined on this mesh".to_owned());
+    }
+    if !out.passed {
+        (out.fault_count, out.faults) = worst(fault::of_whole(subject, metric.name), |v| v);
+        if let ("groups-kept", Some(reference)) = (metric.name, subject.reference()) {
+            out.note = Some(format!("lost: {}", lost_groups(subject.mesh(), reference.mesh()).join(", ")));
+        }
+    }
+    out
+}
+
+/// Which ways a distance metric looks: from the mesh to the reference, and back.
+fn sides(metric: &str) -> Option<[bool; 2]> {
+    match metric {
+        "distance" => Some([true, true]),
+        "distance-to-reference" => Some([true, false]),
+        "distance-from-reference" => Some([false, true]),
+        _ => None,
+    }
+}
+
+/// A distance is refined only until the comparison is decided.
+fn judge_distance(
+    subject: &Subject<'_>,
+    check: &Check,
+    sides: [bool; 2],
+    at_most: f64,
+    bounds: &Bounds,
+) -> Result<GateRow, GateError> {
+    let mut out = row(check, bounds);
+    let Some(reference) = subject.reference() else { return Err(GateError::NoReference(check.metric.clone())) };
+    let except = fault::members(subject.mesh(), &check.except);
+    let (mesh, theirs) = (subject.target(), reference.target());
+    let mut faults = Vec::new();
+    let (mut undecided, mut upper, mut defined) = (0, 0.0_f64, true);
+    for (wanted, from, to, kind) in
+        [(sides[0], mesh, theirs, FaultKind::Face), (sides[1], theirs, mesh, FaultKind::ReferenceFace)]
+    {
+        if !wanted {
+            continue;
+        }
+        let Some(decision) = decide(from, to, at_most, subject.watch())? else {
+            defined = false;
+            continue;
+        };
+        let Decision { beyond, undecided: open, upper: bound, .. } = decision;
+        let counts = |face: FaceId| kind != FaultKind::Face || !except.contains(&face.raw());
+        undecided += open.iter().filter(|(face, _)| counts(*face)).count();
+        upper = upper.max(bound);
+        let of_side = beyond.into_iter().filter(|(face, ..)| counts(*face));
+        faults.extend(of_side.map(|(face, at, d)| Fault { kind, id: face.raw(), at: at.to_array(), value: d }));
+    }
+    out.passed = defined && faults.is_empty() && undecided == 0;
+    let farthest = faults.iter().map(|f| f.value).reduce(f64::max);
+    let measured = farthest.unwrap_or(if except.is_empty() { upper } else { upper.min(at_most) });
+    out.measured = defined.then_some(Value::Number(measured));
+    out.slack = bounds.slack(measured).filter(|_| defined);
+    (out.fault_count, out.faults) = worst(faults, |v| v);
+    out.note = if !defined {
+        Some("undefined: one of the meshes has no face".to_owned())
+    } else if undecided > 0 {
+        Some(format!("{undecided} faces could not be decided within the work allowed"))
+    } else if out.passed {
+        Some("a certified bound, refined until the comparison was decided".to_owned())
+    } else {
+        Some("a distance that is reached".to_owned())
+    };
+    Ok(out)
+}
+
