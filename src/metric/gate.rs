@@ -12,7 +12,6 @@ mod fault;
 
 pub use evaluate::{GateError, evaluate};
 
-
 /// A bound of a check, as the recipe gives it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]

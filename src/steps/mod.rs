@@ -1,6 +1,7 @@
 //! The catalog: every step that a recipe can use, one file and one line each.
 
 pub mod control_properties;
+pub mod measure;
 pub mod read;
 pub mod repair;
 pub mod subdivide;
@@ -13,4 +14,5 @@ pub static CATALOG: &[StepDef] = &[
     StepDef::of::<repair::Step>(),
     StepDef::of::<subdivide::Step>(),
     StepDef::of::<control_properties::Step>(),
+    StepDef::of::<measure::Step>(),
 ];

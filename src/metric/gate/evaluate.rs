@@ -293,4 +293,3 @@ fn judge_distance(
     };
     Ok(out)
 }
-
