@@ -194,3 +194,54 @@ fn nothing_to_repair_is_an_error() {
     let collapsed = soup(&[[0.0; 3], [1.0, 0.0, 0.0]], &[[0, 1, 1]]);
     assert_eq!(failed(&collapsed), Err(RepairError::NothingLeft { collapsed: 1, dropped: 0 }));
 }
+
+/// Repairs a file of the corpus; `None`, said so, where there is no corpus or no reader for the file.
+fn corpus(name: &str, params: &RepairParams) -> Option<(Surface, RepairStats)> {
+    let Some(folder) = std::env::var_os("MESHMILL_CORPUS") else {
+        println!("skipped {name}: MESHMILL_CORPUS is not set");
+        return None;
+    };
+    let path = std::path::Path::new(&folder).join(name);
+    let bytes = std::fs::read(&path).expect("corpus file");
+    let Ok(format) = meshmill::format::Format::detect(name, &bytes) else {
+        println!("skipped {name}: no reader");
+        return None;
+    };
+    let (soup, _) = meshmill::format::read(format, &bytes, &Watch::silent()).expect("reads");
+    let start = std::time::Instant::now();
+    let (surface, stats) = repair(&soup, params, &Watch::silent()).expect("repairs");
+    println!("{name}: {:?} {:?}", start.elapsed(), euler(&surface));
+    let short: Vec<String> = format!("{stats:#?}")
+        .lines()
+        .filter(|l| l.starts_with("    ") && !l.starts_with("     ") && !l.contains(": 0,"))
+        .map(|l| l.trim().to_owned())
+        .collect();
+    println!("    {}", short.join(" "));
+    check_manifold(&surface);
+    let (again, stats2) = repair(&surface.to_soup(), params, &Watch::silent()).expect("repairs again");
+    if again != surface {
+        println!("    NOT IDEMPOTENT {stats2:?}");
+    }
+    Some((surface, stats))
+}
+
+#[test]
+fn corpus_all() {
+    let Some(folder) = std::env::var_os("MESHMILL_CORPUS") else { return };
+    for dir in ["cad", "dirty", "public"] {
+        let mut names: Vec<String> = std::fs::read_dir(std::path::Path::new(&folder).join(dir))
+            .unwrap()
+            .map(|e| e.unwrap().file_name().into_string().unwrap())
+            .filter(|n| !n.contains("scan") && [".stl", ".obj", ".off", ".ply"].iter().any(|e| n.ends_with(e)))
+            .collect();
+        names.sort();
+        for name in names {
+            let weld = if name.contains("jitter") {
+                meshmill::step::Length::Absolute(3e-4)
+            } else {
+                RepairParams::default().weld
+            };
+            corpus(&format!("{dir}/{name}"), &RepairParams { weld, ..RepairParams::default() });
+        }
+    }
+}

@@ -112,3 +112,31 @@ impl EdgeTable {
         twins
     }
 }
+/// The half-edges that leave the tail of `start`, in order round the vertex, and whether they close to a full ring.
+///
+/// In an open fan the first half-edge is the one without a twin.
+pub(super) fn fan(twins: &Twins, start: HalfedgeId) -> (Vec<HalfedgeId>, bool) {
+    let mut first = start;
+    // Turn to the border: from the edge that leaves to the edge that leaves in the face across it.
+    loop {
+        let across = twins[first];
+        if across == NONE {
+            break;
+        }
+        first = next(across);
+        if first == start {
+            break;
+        }
+    }
+    let closed = twins[first] != NONE;
+    let mut ring = vec![first];
+    let mut here = first;
+    loop {
+        let across = twins[previous(here)];
+        if across == NONE || across == first {
+            return (ring, closed);
+        }
+        ring.push(across);
+        here = across;
+    }
+}

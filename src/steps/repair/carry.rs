@@ -181,14 +181,9 @@ impl EdgesByPlace {
     /// The edges between two places; for one that was split, its parts.
     fn between(&self, draft: &Draft, a: VertexId, b: VertexId) -> Vec<EdgeKey> {
         let mut found = Vec::new();
-        let mut open = vec![edge_key(a, b)];
-        while let Some(key) = open.pop() {
+        for key in draft.parts_of_edge(a, b) {
             let start = self.edges.partition_point(|(place, _)| *place < key);
             found.extend(self.edges[start..].iter().take_while(|(place, _)| *place == key).map(|(_, edge)| *edge));
-            // Each split puts a vertex strictly between two others, so that this ends.
-            for &middle in draft.splits.get(&key).into_iter().flatten() {
-                open.extend([edge_key(key[0], middle), edge_key(middle, key[1])]);
-            }
         }
         found.sort_unstable();
         found.dedup();

@@ -3,7 +3,7 @@
 use super::adjacency::{EdgeTable, NONE, Twins, corner_of, face_of, halfedge, head, next, previous, tail};
 use super::draft::Draft;
 use crate::mesh::id::Vertex;
-use crate::mesh::{HalfedgeId, IdVec, VertexId};
+use crate::mesh::{HalfedgeId, IdVec, VertexId, edge_key};
 
 /// What cutting added.
 #[derive(Clone, Copy, Debug, Default)]
@@ -96,6 +96,7 @@ fn split_double_edges(draft: &mut Draft, twins: &mut Twins) -> u64 {
             }
             let [a, b] = [tail(&draft.faces, edges[0]), head(&draft.faces, edges[0])];
             let middle = draft.new_vertex(draft.points[a].midpoint(draft.points[b]), &[a, b]);
+            draft.splits.entry(edge_key(draft.root[a], draft.root[b])).or_default().push(middle);
             for (i, h) in edges.into_iter().enumerate() {
                 let vertex = if i == 0 { middle } else { draft.copy_vertex(middle) };
                 split_edge(draft, twins, h, vertex);

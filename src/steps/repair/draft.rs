@@ -104,6 +104,21 @@ impl Draft {
         self.origin = (0..origin.len()).filter(kept).map(|i| origin[i]).collect();
     }
 
+    /// An edge, and the parts of it where vertices were put on it, by the places of their ends.
+    pub(super) fn parts_of_edge(&self, a: VertexId, b: VertexId) -> Vec<EdgeKey> {
+        let mut parts = vec![edge_key(a, b)];
+        let mut done = 0;
+        // Each vertex lies strictly between two others, so that this ends; the bound holds even if that fails.
+        while done < parts.len() && done < 3 * self.splits.len() + 1 {
+            let [a, b] = parts[done];
+            for &middle in self.splits.get(&parts[done]).into_iter().flatten() {
+                parts.extend([edge_key(a, middle), edge_key(middle, b)]);
+            }
+            done += 1;
+        }
+        parts
+    }
+
     /// The vertices of the draft in which each is replaced by `target`; faces and the input's map follow.
     pub(super) fn redirect(&mut self, target: &IdVec<Vertex, VertexId>) {
         for corners in &mut self.faces {

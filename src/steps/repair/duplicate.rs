@@ -24,8 +24,11 @@ pub(super) struct Duplicates {
     pub(super) cancelled: u64,
 }
 
-/// Drops repeated faces. Of two faces that look in opposite directions both go, when `cancel` allows it and their
-/// neighbours still meet in pairs afterwards; otherwise the first one stays.
+/// Drops repeated faces.
+///
+/// One face of each set stays, with two exceptions that keep neighbours meeting in pairs. Two faces that look in
+/// opposite directions both go, if `cancel` allows it and an even number of faces meets at each of their edges. And of
+/// two that look the same way both stay where each of their neighbours needs one of them, as where solids touch.
 pub(super) fn drop_duplicates(draft: &mut Draft, table: &EdgeTable, cancel: bool) -> Duplicates {
     let mut dropped = Duplicates::default();
     let groups = duplicate_groups(&draft.faces, table);
@@ -33,7 +36,7 @@ pub(super) fn drop_duplicates(draft: &mut Draft, table: &EdgeTable, cancel: bool
         return dropped;
     }
     let mut keep = vec![true; draft.faces.len()];
-    let mut pairs = Vec::new();
+    let mut settled = Vec::new();
     for group in groups {
         let is_even = |f: FaceId| is_even_permutation(draft.faces[f]);
         let first = group[0];
@@ -42,31 +45,47 @@ pub(super) fn drop_duplicates(draft: &mut Draft, table: &EdgeTable, cancel: bool
             keep[f.index()] = false;
             dropped.repeated += 1;
         }
-        pairs.extend(opposite.map(|second| [first, second]));
+        settled.push((first, group[1], opposite));
     }
-    settle_pairs(&mut keep, &mut dropped, table, &pairs, cancel);
+    let sides = Sides::new(&keep, table);
+    for (first, repeat, opposite) in settled {
+        if let Some(second) = opposite {
+            keep[second.index()] = false;
+            if cancel && sides.odd[first.index()] == 0 {
+                keep[first.index()] = false;
+                dropped.cancelled += 2;
+            } else {
+                dropped.repeated += 1;
+            }
+        } else if sides.crowded[first.index()] == 3 {
+            keep[repeat.index()] = true;
+            dropped.repeated -= 1;
+        }
+    }
     draft.retain_faces(&keep);
     dropped
 }
 
-/// Decides on each pair of opposite faces, by the number of kept faces at their edges.
-fn settle_pairs(keep: &mut [bool], dropped: &mut Duplicates, table: &EdgeTable, pairs: &[[FaceId; 2]], cancel: bool) {
-    let mut odd = vec![false; keep.len()];
-    for (_, _, group) in table.edges() {
-        if group.iter().filter(|(_, h)| keep[face_of(*h).index()]).count() % 2 == 1 {
-            for (_, h) in group {
-                odd[face_of(*h).index()] = true;
+/// For each face, at how many of its sides the number of kept faces is odd, and at how many it is odd and at least 3.
+struct Sides {
+    odd: Vec<u8>,
+    crowded: Vec<u8>,
+}
+
+impl Sides {
+    fn new(keep: &[bool], table: &EdgeTable) -> Self {
+        let mut sides = Self { odd: vec![0; keep.len()], crowded: vec![0; keep.len()] };
+        for (_, _, group) in table.edges() {
+            let count = group.iter().filter(|(_, h)| keep[face_of(*h).index()]).count();
+            if count % 2 == 1 {
+                for (_, h) in group {
+                    let face = face_of(*h).index();
+                    sides.odd[face] += 1;
+                    sides.crowded[face] += u8::from(count >= 3);
+                }
             }
         }
-    }
-    for &[first, second] in pairs {
-        keep[second.index()] = false;
-        if cancel && !odd[first.index()] {
-            keep[first.index()] = false;
-            dropped.cancelled += 2;
-        } else {
-            dropped.repeated += 1;
-        }
+        sides
     }
 }
 

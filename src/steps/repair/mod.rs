@@ -28,6 +28,7 @@ mod adjacency;
 mod carry;
 mod components;
 mod cut;
+mod degenerate;
 mod draft;
 mod duplicate;
 mod non_manifold;
@@ -35,6 +36,7 @@ mod orient;
 mod outward;
 mod params;
 mod report;
+mod tjunction;
 mod weld;
 
 pub use params::{FillHoles, KeepComponents, NonManifold, RepairParams, SelfIntersections};
@@ -58,10 +60,9 @@ pub fn repair(soup: &Soup, params: &RepairParams, watch: &Watch) -> Result<(Surf
     let mut stats = RepairStats::default();
     let limit = params.max_move.unwrap_or(params.weld).resolve(diagonal);
     let tolerance = params.weld.resolve(diagonal).min(limit);
-    let mut draft = conform(soup, params, tolerance, &mut stats);
+    let mut draft = conform(soup, tolerance, &mut stats);
     watch.check()?;
-    let mut twins = make_manifold(&mut draft, &mut stats);
-    watch.check()?;
+    let mut twins = make_clean_manifold(&mut draft, soup, params, limit, &mut stats, watch)?;
     let parts = choose_components(&mut draft, &mut twins, params, &mut stats)?;
     let (turned, cavities) = outward::orient_outward(&mut draft, &mut twins, &parts);
     (stats.components_turned, stats.cavities) = (turned, cavities);
@@ -83,8 +84,8 @@ fn check_input(soup: &Soup) -> Result<f64, RepairError> {
     if soup.faces.is_empty() { Err(RepairError::Empty) } else { Ok((high - low).length()) }
 }
 
-/// Triangles that share vertices wherever they touch, each there once.
-fn conform(soup: &Soup, params: &RepairParams, tolerance: f64, stats: &mut RepairStats) -> Draft {
+/// Triangles that share vertices wherever they touch.
+fn conform(soup: &Soup, tolerance: f64, stats: &mut RepairStats) -> Draft {
     let mut draft = draft::triangulate_and_weld_exactly(soup);
     stats.quads_split = soup.faces.iter().filter(|facet| matches!(facet, Facet::Quad(_))).count() as u64;
     stats.vertices_merged = (soup.points.len() - draft.points.len()) as u64;
@@ -96,8 +97,8 @@ fn conform(soup: &Soup, params: &RepairParams, tolerance: f64, stats: &mut Repai
     stats.collapsed_faces += duplicate::drop_collapsed(&mut draft);
     let table = if welded.vertices > 0 { EdgeTable::new(&draft.faces, draft.points.len()) } else { table };
     stats.non_manifold_edges_welded = count_non_manifold(&table);
-    let duplicates = duplicate::drop_duplicates(&mut draft, &table, params.non_manifold == NonManifold::Cut);
-    (stats.repeated_faces, stats.cancelled_faces) = (duplicates.repeated, duplicates.cancelled);
+    let closed = tjunction::close_t_junctions(&mut draft, &table, tolerance - welded.shift);
+    (stats.t_junctions, stats.max_move) = (closed.vertices, welded.shift + closed.distance);
     draft
 }
 
@@ -105,19 +106,71 @@ fn count_non_manifold(table: &EdgeTable) -> u64 {
     table.edges().filter(|(_, _, group)| group.len() > 2).count() as u64
 }
 
+/// Rounds after which joining and cleaning stop; each cleans what the round before uncovered.
+const ROUNDS: u64 = 8;
+
+/// Makes a manifold without degenerate faces.
+///
+/// Where faces at a cut were cleaned, another pairing may fit better now: the cuts are joined again and made anew, so
+/// that the result is one that repairing would not change.
+fn make_clean_manifold(
+    draft: &mut Draft,
+    soup: &Soup,
+    params: &RepairParams,
+    limit: f64,
+    stats: &mut RepairStats,
+    watch: &Watch,
+) -> Result<Twins, RepairError> {
+    loop {
+        stats.rounds += 1;
+        let table = EdgeTable::new(&draft.faces, draft.points.len());
+        let duplicates = duplicate::drop_duplicates(draft, &table, params.non_manifold == NonManifold::Cut);
+        stats.repeated_faces += duplicates.repeated;
+        stats.cancelled_faces += duplicates.cancelled;
+        let was_changed = duplicates.repeated + duplicates.cancelled > 0;
+        let table = if was_changed { EdgeTable::new(&draft.faces, draft.points.len()) } else { table };
+        let mut twins = make_manifold(draft, table, stats);
+        watch.check()?;
+        let is_clean = clean(draft, &mut twins, soup, limit, stats);
+        watch.check()?;
+        if is_clean || stats.vertex_copies == 0 || stats.rounds == ROUNDS {
+            return Ok(twins);
+        }
+        let joined = draft.root.clone();
+        draft.redirect(&joined);
+    }
+}
+
 /// Joins faces in pairs, lets neighbours agree, and gives every fan of faces its own vertices.
-fn make_manifold(draft: &mut Draft, stats: &mut RepairStats) -> Twins {
-    let table = EdgeTable::new(&draft.faces, draft.points.len());
+fn make_manifold(draft: &mut Draft, table: EdgeTable, stats: &mut RepairStats) -> Twins {
     let (mut twins, cut_edges) = non_manifold::pair_faces(draft, &table);
     drop(table);
     let oriented = orient::orient(draft, &mut twins);
     let cut = cut::cut(draft, &mut twins, !cut_edges.is_empty());
     stats.non_manifold_edges_cut = cut_edges.len() as u64;
-    stats.faces_turned = oriented.flipped;
+    stats.faces_turned += oriented.flipped;
     stats.one_sided_edges_cut = oriented.conflicts.len() as u64;
     (stats.vertices_cut, stats.vertex_copies) = (cut.vertices, cut.copies);
-    stats.double_edges_split = cut.split_edges;
+    stats.double_edges_split += cut.split_edges;
     twins
+}
+
+/// Removes faces without height, as far as the rest of the movement allowed reaches; says whether there was none.
+fn clean(draft: &mut Draft, twins: &mut Twins, soup: &Soup, limit: f64, stats: &mut RepairStats) -> bool {
+    let kept = degenerate::Kept::new(draft, &soup.carried);
+    let cleaned = degenerate::remove_degenerate(draft, twins, &kept, limit - stats.max_move + rounding(draft));
+    stats.degenerate_faces = stats.degenerate_faces.max(cleaned.found);
+    stats.degenerate_faces_left = cleaned.left;
+    stats.edges_collapsed += cleaned.collapsed;
+    stats.edges_flipped += cleaned.flipped;
+    stats.slivers_dropped += cleaned.dropped;
+    stats.max_move += cleaned.moved;
+    cleaned.found == cleaned.left
+}
+
+/// What rounded coordinates cannot tell from nothing: a few units in the last place of the largest one.
+fn rounding(draft: &Draft) -> f64 {
+    8.0 * f64::EPSILON * draft.points.iter().fold(0.0, |most: f64, p| most.max(p.abs().max_element()))
 }
 
 /// Drops the components that are not wanted, and describes the others.
@@ -171,7 +224,7 @@ fn check_result(draft: &Draft, stats: &RepairStats, limit: f64) -> Result<(), Re
             return Err(RepairError::NotManifold { face: draft.origin[face].face(), at });
         }
     }
-    if stats.max_move > limit {
+    if stats.max_move > limit + 2.0 * rounding(draft) {
         return Err(RepairError::MovedTooFar { moved: stats.max_move, allowed: limit });
     }
     Ok(())

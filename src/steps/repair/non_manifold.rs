@@ -122,13 +122,20 @@ fn pair_alternating(spokes: &[Spoke]) -> Option<Vec<(HalfedgeId, HalfedgeId)>> {
 const SAME_ANGLE: f64 = 1e-4;
 
 /// Pairs in the order of their flatness; of equally flat ones those that agree in direction come first.
+///
+/// Where as many faces run forward as backward the directions are taken to be right, and every pair agrees: a pair
+/// that did not would turn part of a solid inside out.
 fn pair_flattest(spokes: &[Spoke]) -> Vec<(HalfedgeId, HalfedgeId)> {
+    let balanced = 2 * spokes.iter().filter(|s| s.forward).count() == spokes.len();
     let mut candidates = Vec::new();
     for (i, s) in spokes.iter().enumerate() {
         for (j, t) in spokes.iter().enumerate().skip(i + 1) {
             let turn = (s.angle - t.angle).abs();
             let bend = PI - turn.min(TAU - turn);
             let rank = (!(s.solid && t.solid), (bend / SAME_ANGLE).round() as u64, s.forward == t.forward);
+            if balanced && rank.2 {
+                continue;
+            }
             candidates.push((rank, s.halfedge.min(t.halfedge), s.halfedge.max(t.halfedge), i, j));
         }
     }

@@ -25,7 +25,7 @@ pub struct RepairStats {
     pub collapsed_faces: u64,
     /// Faces dropped because another one has the same three vertices.
     pub repeated_faces: u64,
-    /// Faces dropped in pairs that looked in opposite directions.
+    /// Faces dropped in pairs that looked in opposite directions and enclosed nothing.
     pub cancelled_faces: u64,
     /// Vertices that were put on an open edge they lay beside.
     pub t_junctions: u64,
@@ -33,6 +33,8 @@ pub struct RepairStats {
     pub non_manifold_edges_read: u64,
     /// Edges with more than two faces after it: a higher number means that the weld length is too large.
     pub non_manifold_edges_welded: u64,
+    /// Rounds of joining and cutting that it took until nothing changed.
+    pub rounds: u64,
     /// Edges with more than two faces that were cut.
     pub non_manifold_edges_cut: u64,
     /// Vertices that were cut because more than one fan of faces met there.
