@@ -195,53 +195,64 @@ fn nothing_to_repair_is_an_error() {
     assert_eq!(failed(&collapsed), Err(RepairError::NothingLeft { collapsed: 1, dropped: 0 }));
 }
 
-/// Repairs a file of the corpus; `None`, said so, where there is no corpus or no reader for the file.
-fn corpus(name: &str, params: &RepairParams) -> Option<(Surface, RepairStats)> {
-    let Some(folder) = std::env::var_os("MESHMILL_CORPUS") else {
-        println!("skipped {name}: MESHMILL_CORPUS is not set");
-        return None;
+/// A sphere of radius 1 in `2 n` sectors and `n` bands; bands from `first` to `last` only.
+fn sphere(n: u32, first: u32, last: u32) -> Soup {
+    let at = |i: u32, j: u32| {
+        let (sin_t, cos_t) = libm::sincos(std::f64::consts::PI * f64::from(j) / f64::from(n));
+        let (sin_p, cos_p) = libm::sincos(std::f64::consts::PI * f64::from(i % (2 * n)) / f64::from(n));
+        [sin_t * cos_p, sin_t * sin_p, cos_t]
     };
-    let path = std::path::Path::new(&folder).join(name);
-    let bytes = std::fs::read(&path).expect("corpus file");
-    let Ok(format) = meshmill::format::Format::detect(name, &bytes) else {
-        println!("skipped {name}: no reader");
-        return None;
-    };
-    let (soup, _) = meshmill::format::read(format, &bytes, &Watch::silent()).expect("reads");
-    let start = std::time::Instant::now();
-    let (surface, stats) = repair(&soup, params, &Watch::silent()).expect("repairs");
-    println!("{name}: {:?} {:?}", start.elapsed(), euler(&surface));
-    let short: Vec<String> = format!("{stats:#?}")
-        .lines()
-        .filter(|l| l.starts_with("    ") && !l.starts_with("     ") && !l.contains(": 0,"))
-        .map(|l| l.trim().to_owned())
-        .collect();
-    println!("    {}", short.join(" "));
-    check_manifold(&surface);
-    let (again, stats2) = repair(&surface.to_soup(), params, &Watch::silent()).expect("repairs again");
-    if again != surface {
-        println!("    NOT IDEMPOTENT {stats2:?}");
+    let mut points = Vec::new();
+    for i in 0..2 * n {
+        for j in first..last {
+            if j + 1 < n {
+                points.extend([at(i, j), at(i, j + 1), at(i + 1, j + 1)]);
+            }
+            if j > 0 {
+                points.extend([at(i, j), at(i + 1, j + 1), at(i + 1, j)]);
+            }
+        }
     }
-    Some((surface, stats))
+    let faces: Vec<[u32; 3]> = (0..points.len() as u32 / 3).map(|f| [3 * f, 3 * f + 1, 3 * f + 2]).collect();
+    soup(&points, &faces)
+}
+
+fn fill_all() -> RepairParams {
+    RepairParams { fill_holes: meshmill::steps::repair::FillHoles::All, ..RepairParams::default() }
 }
 
 #[test]
-fn corpus_all() {
-    let Some(folder) = std::env::var_os("MESHMILL_CORPUS") else { return };
-    for dir in ["cad", "dirty", "public"] {
-        let mut names: Vec<String> = std::fs::read_dir(std::path::Path::new(&folder).join(dir))
-            .unwrap()
-            .map(|e| e.unwrap().file_name().into_string().unwrap())
-            .filter(|n| !n.contains("scan") && [".stl", ".obj", ".off", ".ply"].iter().any(|e| n.ends_with(e)))
-            .collect();
-        names.sort();
-        for name in names {
-            let weld = if name.contains("jitter") {
-                meshmill::step::Length::Absolute(3e-4)
-            } else {
-                RepairParams::default().weld
-            };
-            corpus(&format!("{dir}/{name}"), &RepairParams { weld, ..RepairParams::default() });
-        }
-    }
+fn cube_without_a_face_is_filled_as_it_was() {
+    let mut input = cube([0.0; 3]);
+    input.faces = input.faces.iter().take(10).copied().collect();
+    let (open, _) = run(&input);
+    assert_eq!(euler(&open), (1, 4));
+    let (surface, stats) = run_with(&input, &fill_all());
+    assert_eq!((surface.faces.len(), surface.points.len(), euler(&surface)), (12, 8, (2, 0)));
+    assert_eq!((stats.holes_filled, stats.faces_filled, stats.boundary_loops), (1, 2, 1));
+    assert!((volume(&surface) - 1.0).abs() < 1e-12);
+    assert_eq!(surface.carried.groups.faces["filled"].len(), 2);
+}
+
+#[test]
+fn hemisphere_is_closed_by_a_flat_disc() {
+    let (surface, stats) = run_with(&sphere(24, 0, 12), &fill_all());
+    assert_eq!((euler(&surface), stats.holes_filled), ((2, 0), 1));
+    let full = run(&sphere(24, 0, 24)).0;
+    assert!((volume(&surface) / (0.5 * volume(&full)) - 1.0).abs() < 0.01);
+}
+
+#[test]
+fn hole_in_a_smooth_surface_is_filled_smoothly() {
+    let (surface, _) = run_with(&sphere(24, 4, 24), &fill_all());
+    let full = run(&sphere(24, 0, 24)).0;
+    assert_eq!(euler(&surface), (2, 0));
+    assert!((volume(&surface) / volume(&full) - 1.0).abs() < 0.01);
+}
+
+#[test]
+fn outline_of_a_plate_stays_open() {
+    let plate = soup(&[[0.0; 3], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]], &[[0, 1, 2], [0, 2, 3]]);
+    let (surface, stats) = run_with(&plate, &fill_all());
+    assert_eq!((surface.faces.len(), stats.holes_filled), (2, 0));
 }

@@ -13,7 +13,6 @@ pub(super) enum Origin {
     /// It is this face of the input, or a part of it.
     Input(FaceId),
     /// It fills a hole beside this face of the input.
-    #[expect(dead_code, reason = "filling is the next pass to be built")]
     Filled(FaceId),
 }
 

@@ -5,7 +5,7 @@
 //! repeated faces go. At every edge with more than two faces these are joined in pairs by their order round the edge,
 //! and each vertex gets one copy for each fan of faces, which makes the mesh a manifold by construction. Neighbours
 //! are turned until they agree (a Möbius strip is cut), closed components until they look outward, and those that
-//! bound a cavity inward.
+//! bound a cavity inward. Wanted holes are filled with the least bend, refined and faired like their surroundings.
 //!
 //! Based on: Guéziec, Taubin, Lazarus, Horn. Cutting and stitching: converting sets of polygons to manifold surfaces.
 //! IEEE Transactions on Visualization and Computer Graphics 7(2), 2001.
@@ -31,10 +31,13 @@ mod cut;
 mod degenerate;
 mod draft;
 mod duplicate;
+mod fill;
+mod holes;
 mod non_manifold;
 mod orient;
 mod outward;
 mod params;
+mod patch;
 mod report;
 mod tjunction;
 mod weld;
@@ -63,7 +66,10 @@ pub fn repair(soup: &Soup, params: &RepairParams, watch: &Watch) -> Result<(Surf
     let mut draft = conform(soup, tolerance, &mut stats);
     watch.check()?;
     let mut twins = make_clean_manifold(&mut draft, soup, params, limit, &mut stats, watch)?;
-    let parts = choose_components(&mut draft, &mut twins, params, &mut stats)?;
+    let mut parts = choose_components(&mut draft, &mut twins, params, &mut stats)?;
+    if holes::fill_holes(&mut draft, &mut twins, params.fill_holes, diagonal, &mut stats, watch)? {
+        parts = components::components(&draft, &twins);
+    }
     let (turned, cavities) = outward::orient_outward(&mut draft, &mut twins, &parts);
     (stats.components_turned, stats.cavities) = (turned, cavities);
     check_result(&draft, &stats, limit)?;

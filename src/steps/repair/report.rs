@@ -113,8 +113,10 @@ pub enum LoopFate {
     FoldsBack,
     /// Every fill would repeat an edge or a face of the surface; it is as it was.
     Blocked,
-    /// Another loop or component lies within it; it is as it was, because a fill would bury that.
-    HoldsIsland,
+    /// Every fill found would run through the surface, or bury an island in the hole; it is as it was.
+    Obstructed,
+    /// Every fill would have faces without area, as for a slit; it is as it was. A larger weld length closes it.
+    Slit,
 }
 
 /// A connected component.
