@@ -5,6 +5,7 @@ pub mod mesh;
 pub mod metric;
 pub mod plan;
 pub mod recipe;
+pub mod run;
 pub mod step;
 pub mod steps;
 pub mod store;

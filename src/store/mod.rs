@@ -203,9 +203,8 @@ impl Store {
     fn write_whole(&self, path: &Path, bytes: &[u8]) -> Result<(), StoreError> {
         let tmp = self.folder("tmp");
         let write = || -> io::Result<()> {
-            let mut file = tempfile::Builder::new().prefix("w").tempfile_in(&tmp)?;
+            let mut file = shared_with_group(tempfile::Builder::new().prefix("w")).tempfile_in(&tmp)?;
             file.write_all(bytes)?;
-            share(file.as_file())?;
             if let Some(parent) = path.parent() {
                 fs::create_dir_all(parent)?;
             }
@@ -241,16 +240,11 @@ fn refresh(path: &Path) {
     }
 }
 
-/// Temporary files are private to their owner; what is shared in a lab's folder must be readable by the group.
-#[cfg(unix)]
-fn share(file: &fs::File) -> io::Result<()> {
-    use std::os::unix::fs::PermissionsExt;
-    file.set_permissions(fs::Permissions::from_mode(0o664))
-}
-
-#[cfg(not(unix))]
-fn share(_file: &fs::File) -> io::Result<()> {
-    Ok(())
+/// Temporary files are private to their owner as a rule; here the umask decides, so that a lab can share the folder.
+fn shared_with_group<'a, 'b>(builder: &'a mut tempfile::Builder<'b, 'b>) -> &'a mut tempfile::Builder<'b, 'b> {
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    builder
 }
 
 #[cfg(test)]

@@ -1,0 +1,185 @@
+//! What runs on a thread of its own: one node, from its inputs' artifacts to a stored result.
+
+use std::any::Any;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
+use std::time::Instant;
+
+use super::figures::figures;
+use super::observe::{Event, Observer};
+use super::shared::{NoArtifact, Shared, VERSION, recipe_task};
+use super::{FileState, RunError, gate, output};
+use crate::plan::{ContentHash, GateTask, Key, Record, StepTask, Task, TaskId};
+use crate::step::{FailureKind, Inputs, StepFailure};
+use crate::store::{Entry, Outcome};
+use crate::watch::{Progress, Watch};
+
+/// What a node of a run does.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Node {
+    /// A task of the plan.
+    Task(TaskId),
+    /// An output file: case and position in the case.
+    File(usize, usize),
+    /// The elements at fault of a gate: case and position in the case.
+    Faults(usize, usize),
+}
+
+/// How a job ended.
+pub(super) enum Finished {
+    /// The task's result is stored.
+    Task(Box<Entry>),
+    /// The file is right.
+    File(FileState, ContentHash),
+    /// There is nothing to write.
+    Nothing,
+    /// The artifact of this input is gone: make it again, then run this job again.
+    Lost(TaskId),
+    /// It cannot be done.
+    Failed(StepFailure),
+    /// Store or disk failed; the whole run ends.
+    Broken(RunError),
+}
+
+impl From<NoArtifact> for Finished {
+    fn from(reason: NoArtifact) -> Self {
+        match reason {
+            NoArtifact::Lost(task) => Self::Lost(task),
+            NoArtifact::Failed(failure) => Self::Failed(failure),
+        }
+    }
+}
+
+impl<E: Into<RunError>> From<E> for Finished {
+    fn from(error: E) -> Self {
+        Self::Broken(error.into())
+    }
+}
+
+/// Passes a step's progress on under its node's number.
+struct NodeProgress {
+    node: usize,
+    observer: Arc<dyn Observer>,
+}
+
+impl Progress for NodeProgress {
+    fn phase(&self, name: &str, total: Option<u64>) {
+        self.observer.event(&Event::Phase { node: self.node, name, total });
+    }
+
+    fn advance(&self, done: u64, figure: &str) {
+        self.observer.event(&Event::Advance { node: self.node, done, figure });
+    }
+}
+
+/// Runs one node. A panic within becomes a failure of that node.
+pub(super) fn run(shared: &Shared<'_>, index: usize, node: Node, observer: Arc<dyn Observer>) -> Finished {
+    let progress = Arc::new(NodeProgress { node: index, observer });
+    let watch = Watch::new(progress, Arc::clone(&shared.options.cancelled));
+    let work = || match node {
+        Node::Task(id) => task(shared, id, &watch),
+        Node::File(case, position) => output::file(shared, case, position),
+        Node::Faults(case, position) => output::faults(shared, case, position),
+    };
+    catch_unwind(AssertUnwindSafe(work))
+        .unwrap_or_else(|payload| Ok(Finished::Failed(panicked(payload.as_ref()))))
+        .unwrap_or_else(|finished| finished)
+}
+
+fn task(shared: &Shared<'_>, id: TaskId, watch: &Watch) -> Result<Finished, Finished> {
+    let start = Instant::now();
+    let Some((key, record)) = shared.key(id) else {
+        return Err(Finished::Failed(StepFailure::failed("started before its inputs were known")));
+    };
+    let node = shared.plan.node(id);
+    let (outcome, stats) = match &node.task {
+        Task::Source(_) => return Err(Finished::Failed(StepFailure::failed("a file is not a task to run"))),
+        Task::Step(step) => step_task(shared, id, step, watch)?,
+        Task::Gate(gate) => gate_task(shared, id, gate, watch)?,
+    };
+    let entry = entry(shared, &node.label, record, outcome, stats, start);
+    publish(shared, &key, &entry)?;
+    Ok(Finished::Task(Box::new(entry)))
+}
+
+fn entry(
+    shared: &Shared<'_>,
+    label: &str,
+    record: Record,
+    outcome: Outcome,
+    stats: serde_json::Value,
+    start: Instant,
+) -> Entry {
+    Entry {
+        version: VERSION.to_owned(),
+        task: recipe_task(&shared.options.name, label),
+        record: record.fields,
+        outcome,
+        stats,
+        seconds: start.elapsed().as_secs_f64(),
+    }
+}
+
+fn publish(shared: &Shared<'_>, key: &Key, entry: &Entry) -> Result<(), Finished> {
+    shared.store.publish(key, entry).map_err(Finished::from)
+}
+
+fn step_task(
+    shared: &Shared<'_>,
+    id: TaskId,
+    step: &StepTask,
+    watch: &Watch,
+) -> Result<(Outcome, serde_json::Value), Finished> {
+    let mut artifacts = Vec::new();
+    for (name, input) in shared.plan.inputs(id) {
+        artifacts.push((name, shared.artifact(input)?));
+    }
+    let inputs = Inputs::new(artifacts);
+    let work = || catch_unwind(AssertUnwindSafe(|| step.bound.run(&inputs, step.output, &step.locks, watch)));
+    let produced = shared.pool()?.install(work).unwrap_or_else(|payload| Err(panicked(payload.as_ref())));
+    let produced = produced.map_err(Finished::Failed)?;
+    let figures = figures(&produced.artifact);
+    let saved = shared.store.save(&produced.artifact)?;
+    if let Some(before) = shared.learn(id, saved.content) {
+        return Err(Finished::Failed(changed(before, saved.content)));
+    }
+    shared.keep(id, produced.artifact);
+    Ok((Outcome::Artifact { content: saved.content, bytes: saved.bytes, figures }, produced.stats))
+}
+
+fn gate_task(
+    shared: &Shared<'_>,
+    id: TaskId,
+    task: &GateTask,
+    watch: &Watch,
+) -> Result<(Outcome, serde_json::Value), Finished> {
+    let (mut target, mut reference) = (None, None);
+    for (name, input) in shared.plan.inputs(id) {
+        let artifact = shared.artifact(input)?;
+        if name == "target" {
+            target = Some(artifact);
+        } else {
+            reference = Some(artifact);
+        }
+    }
+    let target = target.ok_or_else(|| Finished::Failed(StepFailure::failed("the gate has no mesh to check")))?;
+    let work = || catch_unwind(AssertUnwindSafe(|| gate::evaluate(task, &target, reference.as_ref(), watch)));
+    let report = shared.pool()?.install(work).unwrap_or_else(|payload| Err(panicked(payload.as_ref())));
+    let report = report.map_err(Finished::Failed)?;
+    let json = serde_json::to_value(&report).unwrap_or_default();
+    shared.judge(id, report);
+    Ok((Outcome::Gate(json), serde_json::Value::Null))
+}
+
+fn changed(before: ContentHash, now: ContentHash) -> StepFailure {
+    let (before, now) = (before.to_hex(), now.to_hex());
+    StepFailure::failed(format!("gave {} although equal inputs gave {} before", &now[..12], &before[..12]))
+        .with_help("the step is not deterministic, which is a fault of the program; please report it")
+}
+
+fn panicked(payload: &(dyn Any + Send)) -> StepFailure {
+    let message = payload.downcast_ref::<&str>().map(|text| (*text).to_owned());
+    let message = message.or_else(|| payload.downcast_ref::<String>().cloned()).unwrap_or_default();
+    StepFailure::new(FailureKind::Panicked, format!("panicked: {message}"))
+        .with_help("this is a fault of the program; please report it with the recipe and the input")
+}

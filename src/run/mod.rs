@@ -1,0 +1,97 @@
+//! From a plan to an outcome: tasks run in parallel, are looked up before they run, and are stored when they are done.
+//!
+//! A node is a task of the plan, an output file, or the list of elements at fault of a gate. A node is looked at once
+//! the contents of all its inputs are known; then its key is known, and the store says whether its result is. Only a
+//! node that misses makes its inputs' artifacts be loaded. An artifact is shared by its readers and dropped after the
+//! last one.
+//!
+//! # Invariants
+//! - Every change of state goes through [`board::Board::set`].
+//! - A result is the same for any number of threads: a step sees nothing of the schedule, and what it does in
+//!   parallel it reduces in index order.
+//! - Files appear whole or not at all. A run that dies leaves finished results in the store and, at most, hidden
+//!   temporary files that the next run removes.
+//! - An artifact that was cached and cannot be loaded is computed again; if it then differs, that is a failure.
+//!
+//! # Cost
+//! A cached task costs one small read. Among ready nodes the first of the plan runs first, so that the cases of a
+//! sweep finish one after the other and few artifacts are alive.
+
+pub mod board;
+mod figures;
+mod gate;
+mod job;
+pub mod observe;
+pub mod outcome;
+mod output;
+pub mod preview;
+mod schedule;
+mod shared;
+mod whole;
+
+use std::collections::BTreeSet;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+pub use board::TaskState;
+pub use observe::{Event, Observer, Silent};
+pub use outcome::{FileOutcome, FileState, RunOutcome, TaskOutcome};
+pub use preview::{Forecast, preview};
+pub use schedule::run;
+pub use shared::{VERSION, recipe_task};
+
+use crate::plan::{Plan, Task};
+use crate::store::StoreError;
+
+/// What the caller decides about a run.
+#[derive(Clone, Debug)]
+pub struct RunOptions {
+    /// Name of the recipe; tasks are called `NAME/STEP` in the store.
+    pub name: String,
+    /// Folder for the output files.
+    pub out: PathBuf,
+    /// Most tasks at once, and most threads within them.
+    pub jobs: usize,
+    /// Only these steps and what they need; empty for all.
+    pub only: Vec<String>,
+    /// Steps that run again although they are cached.
+    pub force: Vec<String>,
+    /// Becomes true when the run should stop.
+    pub cancelled: Arc<AtomicBool>,
+}
+
+/// Why a run ended early. Failures of steps and gates are part of the outcome instead.
+#[derive(Debug, thiserror::Error)]
+pub enum RunError {
+    /// The store failed.
+    #[error(transparent)]
+    Store(#[from] StoreError),
+    /// An output could not be written.
+    #[error("cannot {action} {}: {source}", path.display())]
+    Output {
+        /// What was tried.
+        action: &'static str,
+        /// Where.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The threads that were asked for could not be started.
+    #[error("cannot start {0} threads: {1}")]
+    Threads(usize, String),
+}
+
+/// The tasks of these steps, by `STEP` or `STEP.OUTPUT`.
+pub(crate) fn tasks_of(plan: &Plan, steps: &[String]) -> BTreeSet<crate::plan::TaskId> {
+    let of_step = |name: &str, step: &String| name == step || name.split_once('.').is_some_and(|(s, _)| s == step);
+    let mut tasks = BTreeSet::new();
+    for case in plan.cases() {
+        for (name, task) in &case.steps {
+            if steps.iter().any(|step| of_step(name, step)) && matches!(plan.node(*task).task, Task::Step(_)) {
+                tasks.insert(*task);
+            }
+        }
+    }
+    tasks
+}

@@ -1,0 +1,256 @@
+//! Output files: written only when they are not right already, and only under their name when the gates hold.
+//!
+//! What a file must contain is known by a key, like any result: artifact, options and version. The store remembers the
+//! hash of the bytes under that key, so a second run compares hashes and loads no artifact. The bytes carry version
+//! and content hash of the artifact, nothing else, and so repeat. Files of a step whose gate failed go to `failed/`,
+//! and the file of an earlier run that they would have replaced is removed, so that nobody takes it for the result.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use glam::DVec3;
+
+use super::job::Finished;
+use super::shared::{Shared, VERSION, recipe_task};
+use super::{FileState, RunError, whole};
+use crate::format::{self, Element, Format, WriteOptions};
+use crate::mesh::bvh::TriangleBvh;
+use crate::mesh::{FaceId, IdVec, Soup, VertexId};
+use crate::metric::gate::{FaultKind, GateReport};
+use crate::plan::{ContentHash, Gate, Output, OutputOptions, TaskId};
+use crate::step::{Artifact, StepFailure};
+use crate::store::{Entry, Outcome};
+
+/// Where an output of a case belongs, and whether its gates hold. `None` while a gate is undecided.
+pub(super) fn place(shared: &Shared<'_>, case: usize, output: &Output) -> Option<(PathBuf, bool)> {
+    let gates = shared.plan.cases()[case].gates.iter().filter(|gate| gate.target == output.task);
+    let mut passed = true;
+    for task in gates.flat_map(|gate| &gate.tasks) {
+        passed &= shared.report(*task)?.passed();
+    }
+    let folder = shared.folder(case);
+    Some((if passed { folder.join(&output.file) } else { folder.join("failed").join(&output.file) }, passed))
+}
+
+/// Where the elements at fault of a gate go.
+pub(super) fn faults_place(shared: &Shared<'_>, case: usize, gate: usize) -> PathBuf {
+    let gates = &shared.plan.cases()[case].gates;
+    let name = if gates.len() == 1 { "failed.vtu".to_owned() } else { format!("failed-{}.vtu", gates[gate].step) };
+    shared.folder(case).join("failed").join(name)
+}
+
+/// Sees to one output file.
+pub(super) fn file(shared: &Shared<'_>, case: usize, position: usize) -> Result<Finished, Finished> {
+    let output = &shared.plan.cases()[case].outputs[position];
+    let Some((path, passed)) = place(shared, case, output) else { return Ok(Finished::Nothing) };
+    let folder = shared.folder(case);
+    let other = if passed { folder.join("failed").join(&output.file) } else { folder.join(&output.file) };
+    remove(&other)?;
+    let content = known(shared, output.task)?;
+    let midside = output.options.midside_on.map(|task| known(shared, task)).transpose()?;
+    let key = file_key(content, midside, &output.options, &output.file);
+    settle(shared, &key, &path, &output.step, || {
+        let artifact = shared.artifact(output.task)?;
+        let midside = output.options.midside_on.map(|task| shared.artifact(task)).transpose()?;
+        encode(&artifact, midside.as_ref(), &output.options, &output.file, content).map_err(Finished::Failed)
+    })
+}
+
+/// Writes the elements at fault of a gate that failed; removes those of an earlier run when it holds.
+pub(super) fn faults(shared: &Shared<'_>, case: usize, position: usize) -> Result<Finished, Finished> {
+    let gate = &shared.plan.cases()[case].gates[position];
+    let path = faults_place(shared, case, position);
+    let reports: Option<Vec<&GateReport>> = gate.tasks.iter().map(|task| shared.report(*task)).collect();
+    let Some(reports) = reports else { return Ok(Finished::Nothing) };
+    if reports.iter().all(|report| report.rows.iter().all(|row| row.faults.is_empty())) {
+        remove(&path)?;
+        return Ok(Finished::Nothing);
+    }
+    let content = known(shared, gate.target)?;
+    let mut hasher = blake3::Hasher::new();
+    part(&mut hasher, b"faults");
+    part(&mut hasher, VERSION.as_bytes());
+    part(&mut hasher, content.as_bytes());
+    part(&mut hasher, &serde_json::to_vec(&reports).unwrap_or_default());
+    settle(shared, &hasher.finalize(), &path, &gate.step, || {
+        let soup = faults_soup(shared, gate, &reports)?;
+        let options = WriteOptions { binary: true, header: header(content), ..WriteOptions::default() };
+        let format = Format::from_file_name("failed.vtu");
+        let format = format.ok_or_else(|| Finished::Failed(StepFailure::failed("there is no writer for VTU")))?;
+        format::write(format, &soup, &options).map_err(|error| Finished::Failed(StepFailure::failed(error.to_string())))
+    })
+}
+
+/// Writes the file unless it is right already.
+fn settle(
+    shared: &Shared<'_>,
+    key: &ContentHash,
+    path: &Path,
+    step: &str,
+    make: impl FnOnce() -> Result<Vec<u8>, Finished>,
+) -> Result<Finished, Finished> {
+    let current = if path.is_file() { shared.index.hash(path).ok() } else { None };
+    let expected = match shared.store.entry(key).map(|entry| entry.outcome) {
+        Some(Outcome::File { content, .. }) => Some(content),
+        Some(Outcome::Artifact { .. } | Outcome::Gate(_)) | None => None,
+    };
+    if let (Some(current), Some(expected)) = (current, expected)
+        && current == expected
+    {
+        return Ok(Finished::File(FileState::Current, current));
+    }
+    let bytes = make()?;
+    let content = blake3::hash(&bytes);
+    if current != Some(content) {
+        whole::write(path, &bytes).map_err(broken("write", path))?;
+    }
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    shared.store.publish(
+        key,
+        &Entry {
+            version: VERSION.to_owned(),
+            task: recipe_task(&shared.options.name, &format!("{step} -> {name}")),
+            record: Vec::new(),
+            outcome: Outcome::File { content, bytes: bytes.len() as u64 },
+            stats: serde_json::Value::Null,
+            seconds: 0.0,
+        },
+    )?;
+    let state = if current == Some(content) { FileState::Current } else { FileState::Written };
+    Ok(Finished::File(state, content))
+}
+
+fn known(shared: &Shared<'_>, task: TaskId) -> Result<ContentHash, Finished> {
+    shared.content(task).ok_or(Finished::Lost(task))
+}
+
+fn remove(path: &Path) -> Result<(), Finished> {
+    match fs::remove_file(path) {
+        Ok(()) => Ok(()),
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(()),
+        Err(error) => Err(broken("remove", path)(error)),
+    }
+}
+
+fn broken(action: &'static str, path: &Path) -> impl FnOnce(std::io::Error) -> Finished {
+    move |source| Finished::Broken(RunError::Output { action, path: path.to_path_buf(), source })
+}
+
+fn part(hasher: &mut blake3::Hasher, bytes: &[u8]) {
+    hasher.update(&(bytes.len() as u64).to_le_bytes());
+    hasher.update(bytes);
+}
+
+fn file_key(content: ContentHash, midside: Option<ContentHash>, options: &OutputOptions, file: &Path) -> ContentHash {
+    let OutputOptions { element, midside_on: _, binary, precision, first_id } = options;
+    let ending = file.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+    let mut hasher = blake3::Hasher::new();
+    part(&mut hasher, b"file");
+    part(&mut hasher, VERSION.as_bytes());
+    part(&mut hasher, content.as_bytes());
+    part(&mut hasher, midside.as_ref().map_or(&[], |hash| hash.as_bytes()));
+    part(&mut hasher, ending.as_bytes());
+    part(&mut hasher, format!("{element:?} {binary:?} {precision:?} {first_id:?}").as_bytes());
+    hasher.finalize()
+}
+
+fn header(content: ContentHash) -> String {
+    format!("meshmill {VERSION} {}", content.to_hex())
+}
+
+/// The bytes of an output file.
+fn encode(
+    artifact: &Artifact,
+    midside: Option<&Artifact>,
+    options: &OutputOptions,
+    file: &Path,
+    content: ContentHash,
+) -> Result<Vec<u8>, StepFailure> {
+    let name = file.file_name().unwrap_or_default().to_string_lossy();
+    if let Artifact::Metrics(metrics) = artifact {
+        return encode_metrics(metrics, &name);
+    }
+    let format = Format::from_file_name(&name).ok_or_else(|| unknown_ending(&name))?;
+    let soup = artifact.to_soup().ok_or_else(|| StepFailure::failed(format!("a {} is not a mesh", artifact.port())))?;
+    let element = options.element.as_deref().map(element).transpose()?;
+    let tree = midside.map(|artifact| artifact.as_surface().map(|surface| TriangleBvh::of_surface(surface))).transpose()?;
+    let project = tree.map(|tree| move |p: DVec3| tree.closest(p).map_or(p, |closest| closest.nearest.point));
+    let options = WriteOptions {
+        element,
+        midside: project.as_ref().map(|project| project as &(dyn Fn(DVec3) -> DVec3 + Sync)),
+        binary: options.binary.unwrap_or(true),
+        precision: options.precision.map(|digits| digits as usize),
+        first_id: options.first_id,
+        header: header(content),
+    };
+    format::write(format, &soup, &options).map_err(|error| {
+        let remedy = error.remedy.clone();
+        let failure = StepFailure::failed(format!("cannot write {name}: {error}"));
+        if let Some(remedy) = remedy { failure.with_help(remedy) } else { failure }
+    })
+}
+
+fn element(name: &str) -> Result<Element, StepFailure> {
+    serde_json::from_value(serde_json::Value::from(name))
+        .map_err(|_| StepFailure::failed(format!("unknown element `{name}`")).with_help("use S3, S4, S6 or S8R"))
+}
+
+fn encode_metrics(metrics: &crate::metric::Measurement, name: &str) -> Result<Vec<u8>, StepFailure> {
+    let ending = name.rsplit_once('.').map_or("", |(_, ending)| ending).to_ascii_lowercase();
+    let text = match ending.as_str() {
+        "json" => serde_json::to_string_pretty(metrics).map_err(|error| error.to_string()),
+        "ron" => ron::ser::to_string_pretty(metrics, ron::ser::PrettyConfig::default()).map_err(|error| error.to_string()),
+        _ => return Err(unknown_ending(name).with_help("a table of metrics is written as .json or .ron")),
+    };
+    text.map(|text| (text + "\n").into_bytes()).map_err(StepFailure::failed)
+}
+
+fn unknown_ending(name: &str) -> StepFailure {
+    let known: Vec<&str> = Format::ALL.iter().flat_map(|format| format.endings()).copied().collect();
+    StepFailure::failed(format!("`{name}` names no format that can be written"))
+        .with_help(format!("use one of the endings {}", known.join(", ")))
+}
+
+/// The faces at fault as a mesh of their own, with one face group for each check that failed.
+fn faults_soup(shared: &Shared<'_>, gate: &Gate, reports: &[&GateReport]) -> Result<Soup, Finished> {
+    let mut soup = Soup::default();
+    let target = shared.artifact(gate.target)?.to_soup();
+    for (task, report) in gate.tasks.iter().zip(reports) {
+        let inputs = shared.plan.inputs(*task);
+        let reference = inputs.iter().find(|(name, _)| *name == "reference").map(|(_, input)| shared.artifact(*input));
+        let reference = reference.transpose()?.and_then(|artifact| artifact.to_soup());
+        for row in &report.rows {
+            let of_kind = |kind| row.faults.iter().filter(move |fault| fault.kind == kind).map(|fault| fault.id);
+            if let Some(target) = &target {
+                let vertices: BTreeSet<u32> = of_kind(FaultKind::Vertex).collect();
+                let touched = target.faces.enumerate().filter(|(_, facet)| {
+                    facet.corners().iter().any(|corner| vertices.contains(&corner.raw()))
+                });
+                let mut faces: BTreeSet<u32> = of_kind(FaultKind::Face).collect();
+                if !vertices.is_empty() {
+                    faces.extend(touched.map(|(face, _)| face.raw()));
+                }
+                append(&mut soup, target, &faces, &row.metric);
+            }
+            if let Some(reference) = &reference {
+                append(&mut soup, reference, &of_kind(FaultKind::ReferenceFace).collect(), &row.metric);
+            }
+        }
+    }
+    Ok(soup)
+}
+
+/// Adds some faces of a mesh, with points of their own, to the group `name`.
+fn append(soup: &mut Soup, from: &Soup, faces: &BTreeSet<u32>, name: &str) {
+    let mut points: IdVec<_, Option<VertexId>> = IdVec::filled(None, if faces.is_empty() { 0 } else { from.points.len() });
+    for face in faces {
+        let Some(mut facet) = from.faces.get(FaceId::from_raw(*face)).copied() else { continue };
+        for corner in facet.corners_mut() {
+            let known: &mut Option<VertexId> = &mut points[*corner];
+            *corner = *known.get_or_insert_with(|| soup.points.push(from.points[*corner]));
+        }
+        let added = soup.faces.push(facet);
+        soup.carried.groups.faces.entry(name.to_owned()).or_default().push(added);
+    }
+}
