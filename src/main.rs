@@ -1,3 +1,5 @@
 //! The `meshmill` command.
 
-fn main() {}
+fn main() -> std::process::ExitCode {
+    meshmill::cli::main()
+}

@@ -62,7 +62,7 @@ impl TaskState {
 }
 
 /// All states, and for each node how many others still need its artifact.
-pub struct Board {
+pub(super) struct Board {
     states: Vec<TaskState>,
     inputs: Vec<Vec<usize>>,
     users: Vec<Vec<usize>>,
@@ -90,10 +90,6 @@ impl Board {
 
     pub(super) fn state(&self, node: usize) -> TaskState {
         self.states[node]
-    }
-
-    pub(super) fn label(&self, node: usize) -> &str {
-        &self.labels[node]
     }
 
     pub(super) fn inputs(&self, node: usize) -> &[usize] {

@@ -95,3 +95,8 @@ pub(crate) fn tasks_of(plan: &Plan, steps: &[String]) -> BTreeSet<crate::plan::T
     }
     tasks
 }
+
+/// Writes a file that appears whole or not at all, and makes its folder.
+pub fn write_file(path: &std::path::Path, bytes: &[u8]) -> Result<(), RunError> {
+    whole::write(path, bytes).map_err(|source| RunError::Output { action: "write", path: path.to_path_buf(), source })
+}

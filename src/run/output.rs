@@ -174,7 +174,8 @@ fn encode(
     let format = Format::from_file_name(&name).ok_or_else(|| unknown_ending(&name))?;
     let soup = artifact.to_soup().ok_or_else(|| StepFailure::failed(format!("a {} is not a mesh", artifact.port())))?;
     let element = options.element.as_deref().map(element).transpose()?;
-    let tree = midside.map(|artifact| artifact.as_surface().map(|surface| TriangleBvh::of_surface(surface))).transpose()?;
+    let tree =
+        midside.map(|artifact| artifact.as_surface().map(|surface| TriangleBvh::of_surface(surface))).transpose()?;
     let project = tree.map(|tree| move |p: DVec3| tree.closest(p).map_or(p, |closest| closest.nearest.point));
     let options = WriteOptions {
         element,
@@ -200,7 +201,9 @@ fn encode_metrics(metrics: &crate::metric::Measurement, name: &str) -> Result<Ve
     let ending = name.rsplit_once('.').map_or("", |(_, ending)| ending).to_ascii_lowercase();
     let text = match ending.as_str() {
         "json" => serde_json::to_string_pretty(metrics).map_err(|error| error.to_string()),
-        "ron" => ron::ser::to_string_pretty(metrics, ron::ser::PrettyConfig::default()).map_err(|error| error.to_string()),
+        "ron" => {
+            ron::ser::to_string_pretty(metrics, ron::ser::PrettyConfig::default()).map_err(|error| error.to_string())
+        }
         _ => return Err(unknown_ending(name).with_help("a table of metrics is written as .json or .ron")),
     };
     text.map(|text| (text + "\n").into_bytes()).map_err(StepFailure::failed)
@@ -224,9 +227,10 @@ fn faults_soup(shared: &Shared<'_>, gate: &Gate, reports: &[&GateReport]) -> Res
             let of_kind = |kind| row.faults.iter().filter(move |fault| fault.kind == kind).map(|fault| fault.id);
             if let Some(target) = &target {
                 let vertices: BTreeSet<u32> = of_kind(FaultKind::Vertex).collect();
-                let touched = target.faces.enumerate().filter(|(_, facet)| {
-                    facet.corners().iter().any(|corner| vertices.contains(&corner.raw()))
-                });
+                let touched = target
+                    .faces
+                    .enumerate()
+                    .filter(|(_, facet)| facet.corners().iter().any(|corner| vertices.contains(&corner.raw())));
                 let mut faces: BTreeSet<u32> = of_kind(FaultKind::Face).collect();
                 if !vertices.is_empty() {
                     faces.extend(touched.map(|(face, _)| face.raw()));
@@ -243,7 +247,8 @@ fn faults_soup(shared: &Shared<'_>, gate: &Gate, reports: &[&GateReport]) -> Res
 
 /// Adds some faces of a mesh, with points of their own, to the group `name`.
 fn append(soup: &mut Soup, from: &Soup, faces: &BTreeSet<u32>, name: &str) {
-    let mut points: IdVec<_, Option<VertexId>> = IdVec::filled(None, if faces.is_empty() { 0 } else { from.points.len() });
+    let mut points: IdVec<_, Option<VertexId>> =
+        IdVec::filled(None, if faces.is_empty() { 0 } else { from.points.len() });
     for face in faces {
         let Some(mut facet) = from.faces.get(FaceId::from_raw(*face)).copied() else { continue };
         for corner in facet.corners_mut() {

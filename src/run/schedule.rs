@@ -355,6 +355,11 @@ impl<'a> Schedule<'a> {
                 }
             }
         }
-        RunOutcome { tasks: self.tasks, files, cancelled: self.shared.options.cancelled.load(Ordering::Relaxed), seconds }
+        RunOutcome {
+            tasks: self.tasks,
+            files,
+            cancelled: self.shared.options.cancelled.load(Ordering::Relaxed),
+            seconds,
+        }
     }
 }

@@ -1,0 +1,70 @@
+//! A table of metrics as text: one row a metric, in the order of the registry.
+
+use crate::metric::registry::{METRICS, Unit};
+use crate::metric::{Measurement, Value};
+
+/// Name, value and unit of every metric that is defined. Metrics that the registry does not know come last.
+pub fn rows(measurement: &Measurement) -> Vec<[String; 3]> {
+    let known = METRICS.iter().filter_map(|metric| {
+        let value = measurement.values.get(metric.name)?;
+        Some([metric.name.to_owned(), value_text(value), unit_text(metric.unit).to_owned()])
+    });
+    let others = measurement.values.iter().filter(|(name, _)| !METRICS.iter().any(|metric| metric.name == name.as_str()));
+    known.chain(others.map(|(name, value)| [name.clone(), value_text(value), String::new()])).collect()
+}
+
+/// A value for people.
+pub fn value_text(value: &Value) -> String {
+    match value {
+        Value::Count(count) => count.to_string(),
+        Value::Integer(number) => number.to_string(),
+        Value::Number(number) => number_text(*number),
+        Value::Flag(flag) => if *flag { "yes" } else { "no" }.to_owned(),
+    }
+}
+
+/// Six significant digits, and no more than the number has.
+pub fn number_text(number: f64) -> String {
+    if number == 0.0 || !number.is_finite() {
+        return format!("{number}");
+    }
+    let magnitude = libm::floor(libm::log10(number.abs())) as i32;
+    if (-5..15).contains(&magnitude) {
+        let decimals = usize::try_from(5 - magnitude).unwrap_or(0);
+        let text = format!("{number:.decimals$}");
+        if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+    } else {
+        format!("{number:.5e}")
+    }
+}
+
+fn unit_text(unit: Unit) -> &'static str {
+    match unit {
+        Unit::Length => "length",
+        Unit::Area => "area",
+        Unit::Volume => "volume",
+        Unit::Degrees => "degrees",
+        Unit::Share => "share",
+        Unit::Ratio | Unit::Count | Unit::Flag => "",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_have_six_digits_and_no_idle_zeros() {
+        for (number, text) in [
+            (0.2, "0.2"),
+            (1234.5678, "1234.57"),
+            (-0.001_234_567_8, "-0.00123457"),
+            (3.3e-10, "3.30000e-10"),
+            (100.0, "100"),
+            (123_456_789.0, "123456789"),
+            (0.0, "0"),
+        ] {
+            assert_eq!(number_text(number), text);
+        }
+    }
+}

@@ -1,0 +1,244 @@
+//! From the outcome of a run to what people and programs read of it.
+//!
+//! [`Report`] is the one model: `run.ron` is its RON, `--json` its JSON, the terminal shows its tables. Everything that
+//! repeats from run to run stands apart from `timings`, which does not.
+
+pub mod measure;
+pub mod record;
+pub mod table;
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use crate::metric::Measurement;
+use crate::metric::gate::GateRow;
+use crate::plan::{Plan, Task, TaskId};
+use crate::run::{FileState, RunOutcome, TaskOutcome, TaskState, VERSION};
+use crate::step::StepFailure;
+use crate::store::{Figures, Outcome};
+
+/// How a run ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Status {
+    /// Everything was made and every gate holds.
+    Done,
+    /// A forced step gave something else than before: a fault of the program.
+    Differs,
+    /// An input file is wrong.
+    BadInput,
+    /// A gate does not hold.
+    GateFailed,
+    /// A step failed.
+    StepFailed,
+    /// It was interrupted.
+    Cancelled,
+}
+
+/// A run, for people and programs.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Report {
+    /// Version of the program.
+    pub meshmill: String,
+    /// Name of the recipe.
+    pub recipe: String,
+    /// How the run ended.
+    pub status: Status,
+    /// The cases, one for a plain run.
+    pub cases: Vec<CaseReport>,
+    /// Files that were read, by path, with the BLAKE3 hash of their bytes.
+    pub inputs: BTreeMap<String, Option<String>>,
+    /// States and seconds of this run, by task label; a cached task tells the seconds it once took.
+    pub timings: Timings,
+}
+
+/// One case of a run.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct CaseReport {
+    /// Its name; empty for a plain run.
+    pub name: String,
+    /// Parameters with their values, as they would be written.
+    pub params: BTreeMap<String, String>,
+    /// Steps, in the order of the graph.
+    pub steps: Vec<StepReport>,
+    /// Gates, by step.
+    pub gates: Vec<GateSection>,
+    /// Output files, in the order of the recipe.
+    pub files: Vec<FileReport>,
+}
+
+/// One step of a case.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct StepReport {
+    /// Its name in the recipe, with `.OUTPUT` for a further output.
+    pub name: String,
+    /// The kind of step.
+    pub kind: String,
+    /// Its key in the cache, where it became known.
+    pub key: Option<String>,
+    /// The hash of its result.
+    pub content: Option<String>,
+    /// Size and quality of its result.
+    pub figures: Option<Figures>,
+    /// What the step says of its work.
+    pub stats: Option<serde_json::Value>,
+    /// Why it failed.
+    pub failure: Option<StepFailure>,
+    /// The hash of its result before, where it was forced and gave another one.
+    pub differs_from: Option<String>,
+}
+
+/// The checks of one step.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct GateSection {
+    /// The step as the recipe names it.
+    pub step: String,
+    /// Whether all checks hold; absent where they could not be decided.
+    pub passed: Option<bool>,
+    /// The checks.
+    pub rows: Vec<GateRow>,
+    /// Why checks could not be decided.
+    pub failures: Vec<StepFailure>,
+}
+
+/// An output file.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FileReport {
+    /// Where it is.
+    pub path: String,
+    /// The step that it was written of.
+    pub step: String,
+    /// Hash of its bytes; absent where it was not written.
+    pub content: Option<String>,
+    /// Whether it shows a result whose gate failed.
+    pub failed_gate: bool,
+    /// Why it could not be written.
+    pub failure: Option<StepFailure>,
+}
+
+/// What differs from run to run.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Timings {
+    /// Seconds of the run.
+    pub total: f64,
+    /// State and seconds by task label.
+    pub tasks: BTreeMap<String, (TaskState, f64)>,
+    /// State of each output file.
+    pub files: BTreeMap<String, FileState>,
+}
+
+impl Report {
+    /// The report of a run.
+    pub fn new(recipe: &str, plan: &Plan, outcome: &RunOutcome) -> Self {
+        let mut timings = Timings { total: outcome.seconds, ..Timings::default() };
+        let mut inputs = BTreeMap::new();
+        for id in plan.order() {
+            let (node, task) = (plan.node(id), outcome.task(id));
+            if let Task::Source(source) = &node.task {
+                inputs.insert(source.path.display().to_string(), task.content.map(|hash| hash.to_hex().to_string()));
+            } else {
+                let seconds = task.entry.as_ref().map_or(0.0, |entry| entry.seconds);
+                timings.tasks.insert(node.label.clone(), (task.state, seconds));
+            }
+        }
+        for file in &outcome.files {
+            timings.files.insert(file.path.display().to_string(), file.state);
+        }
+        let cases = (0..plan.cases().len()).map(|case| CaseReport::new(plan, outcome, case)).collect();
+        let recipe = recipe.to_owned();
+        Self { meshmill: VERSION.to_owned(), recipe, status: status(outcome), cases, inputs, timings }
+    }
+
+    /// All failures of a run, with the name of what failed.
+    pub fn failures(&self) -> impl Iterator<Item = (&str, &StepFailure)> {
+        self.cases.iter().flat_map(|case| {
+            let steps = case.steps.iter().filter_map(|step| Some((step.name.as_str(), step.failure.as_ref()?)));
+            let gates = case.gates.iter().flat_map(|gate| gate.failures.iter().map(|f| (gate.step.as_str(), f)));
+            let files = case.files.iter().filter_map(|file| Some((file.path.as_str(), file.failure.as_ref()?)));
+            steps.chain(gates).chain(files)
+        })
+    }
+}
+
+fn status(outcome: &RunOutcome) -> Status {
+    let failed = |task: &TaskOutcome| task.state == TaskState::Failed;
+    if outcome.cancelled {
+        Status::Cancelled
+    } else if outcome.bad_input() {
+        Status::BadInput
+    } else if outcome.tasks.iter().any(failed) || outcome.files.iter().any(|file| file.failure.is_some()) {
+        Status::StepFailed
+    } else if outcome.gate_failed() {
+        Status::GateFailed
+    } else if outcome.differs() {
+        Status::Differs
+    } else {
+        Status::Done
+    }
+}
+
+impl CaseReport {
+    fn new(plan: &Plan, outcome: &RunOutcome, number: usize) -> Self {
+        let case = &plan.cases()[number];
+        let mut steps: Vec<(TaskId, &String)> = case.steps.iter().map(|(name, task)| (*task, name)).collect();
+        steps.sort_unstable();
+        let gates = case.gates.iter().map(|gate| gate_section(gate, outcome)).collect();
+        let files = outcome.files.iter().filter(|file| file.case == number);
+        let files = files.map(|file| FileReport {
+            path: file.path.display().to_string(),
+            step: file.step.clone(),
+            content: file.content.map(|hash| hash.to_hex().to_string()),
+            failed_gate: file.failed_gate,
+            failure: file.failure.clone(),
+        });
+        Self {
+            name: case.name.clone(),
+            params: case.params.clone(),
+            steps: steps.into_iter().filter_map(|(id, name)| step_report(plan, outcome, id, name)).collect(),
+            gates,
+            files: files.collect(),
+        }
+    }
+
+    /// The metrics that `measure` steps made, by step.
+    pub fn measurements(&self) -> impl Iterator<Item = (&str, &Measurement)> {
+        let metrics = |step: &'_ StepReport| step.figures.as_ref().and_then(|figures| figures.metrics.as_ref()).is_some();
+        let steps = self.steps.iter().filter(move |step| metrics(step));
+        steps.filter_map(|step| Some((step.name.as_str(), step.figures.as_ref()?.metrics.as_ref()?)))
+    }
+}
+
+fn gate_section(gate: &crate::plan::Gate, outcome: &RunOutcome) -> GateSection {
+    let mut section = GateSection { step: gate.step.clone(), passed: Some(true), rows: Vec::new(), failures: Vec::new() };
+    for task in gate.tasks.iter().map(|task| outcome.task(*task)) {
+        match task.gate_report() {
+            Some(report) => {
+                section.passed = section.passed.map(|passed| passed && report.passed());
+                section.rows.extend(report.rows);
+            }
+            None => section.passed = None,
+        }
+        section.failures.extend(task.failure.clone());
+    }
+    section
+}
+
+fn step_report(plan: &Plan, outcome: &RunOutcome, id: TaskId, name: &str) -> Option<StepReport> {
+    let Task::Step(step) = &plan.node(id).task else { return None };
+    let task = outcome.task(id);
+    let figures = task.entry.as_ref().and_then(|entry| match &entry.outcome {
+        Outcome::Artifact { figures, .. } => Some(figures.clone()),
+        Outcome::Gate(_) | Outcome::File { .. } => None,
+    });
+    Some(StepReport {
+        name: name.to_owned(),
+        kind: step.def.name.to_owned(),
+        key: task.key.map(|key| key.to_hex().to_string()),
+        content: task.content.map(|content| content.to_hex().to_string()),
+        figures,
+        stats: task.entry.as_ref().map(|entry| entry.stats.clone()),
+        failure: task.failure.clone(),
+        differs_from: task.differs.map(|(before, _)| before.to_hex().to_string()),
+    })
+}
