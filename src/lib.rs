@@ -1,10 +1,12 @@
 //! meshmill: recipes that turn any triangle mesh into a finite-element surface mesh, run as a cached graph.
 
+pub mod cli;
 pub mod format;
 pub mod mesh;
 pub mod metric;
 pub mod plan;
 pub mod recipe;
+pub mod report;
 pub mod run;
 pub mod step;
 pub mod steps;

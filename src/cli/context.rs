@@ -9,7 +9,6 @@ use etcetera::BaseStrategy;
 use super::Global;
 use super::exit::{Exit, Fault};
 use crate::format::Format;
-use crate::metric::registry::METRICS;
 use crate::plan::{self, Context, Plan};
 use crate::recipe::{Overrides, Recipe, suggest};
 use crate::steps::CATALOG;
@@ -43,7 +42,7 @@ impl RecipeArguments {
         };
         let load = |path: &Path| fs::read_to_string(path).map_err(|error| error.to_string());
         let recipe = Recipe::load(&self.recipe, &load, &overrides)?;
-        let plan = plan::plan(&recipe, &context(&check_file, &endings(), &metric_names()))?;
+        let plan = plan::plan(&recipe, &Context { catalog: CATALOG, check_file: &check_file, endings: &endings() })?;
         Ok(Planned { recipe, plan })
     }
 }
@@ -62,23 +61,10 @@ impl Planned {
     }
 }
 
-/// What planning needs to know of this program.
-fn context<'a>(
-    check_file: &'a dyn Fn(&Path) -> Result<(), String>,
-    endings: &'a [&'a str],
-    metrics: &'a [&'a str],
-) -> Context<'a> {
-    Context { catalog: CATALOG, check_file, endings, metrics }
-}
-
 /// The endings of files that can be written: meshes, and tables of metrics.
 fn endings() -> Vec<&'static str> {
     let meshes = Format::ALL.iter().flat_map(|format| format.endings()).copied();
     meshes.chain(["json", "ron"]).collect()
-}
-
-fn metric_names() -> Vec<&'static str> {
-    METRICS.iter().map(|metric| metric.name).collect()
 }
 
 fn check_file(path: &Path) -> Result<(), String> {

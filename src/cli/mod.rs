@@ -94,7 +94,8 @@ pub fn main() -> ExitCode {
     });
     let result = result.unwrap_or_else(|_| {
         let message = "the program reached a state that it should not; nothing partial was written";
-        Err(Fault::new(Exit::Fault, message).help("please report this with the command line; -v tells where it happened"))
+        Err(Fault::new(Exit::Fault, message)
+            .help("please report this with the command line; -v tells where it happened"))
     });
     match result {
         Ok(exit) => exit.into(),

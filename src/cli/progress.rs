@@ -20,7 +20,11 @@ pub(super) fn observer(quiet: bool, verbose: bool) -> Arc<dyn Observer> {
     if quiet {
         Arc::new(Silent)
     } else if std::io::stderr().is_terminal() {
-        Arc::new(Bars { all: MultiProgress::with_draw_target(ProgressDrawTarget::stderr()), running: Mutex::default(), verbose })
+        Arc::new(Bars {
+            all: MultiProgress::with_draw_target(ProgressDrawTarget::stderr()),
+            running: Mutex::default(),
+            verbose,
+        })
     } else {
         Arc::new(Lines { running: Mutex::default(), verbose })
     }
@@ -85,7 +89,9 @@ impl Observer for Bars {
                     bar.set_message(name.to_owned());
                     if let Some(total) = total {
                         bar.set_length(total);
-                        bar.set_style(style("{spinner} {prefix:20!} {elapsed:>5} {bar:24} {percent:>3}% {per_sec:>12} {wide_msg}"));
+                        bar.set_style(style(
+                            "{spinner} {prefix:20!} {elapsed:>5} {bar:24} {percent:>3}% {per_sec:>12} {wide_msg}",
+                        ));
                     } else {
                         bar.set_style(style("{spinner} {prefix:20!} {elapsed:>5} {wide_msg}"));
                     }

@@ -6,9 +6,9 @@ use std::sync::Arc;
 use super::Global;
 use super::context::{Planned, RecipeArguments, open_store};
 use super::exit::{Exit, Fault, data, say, say_failure};
+use super::progress;
 use super::signals::Interrupt;
 use super::trace::Trace;
-use super::progress;
 use crate::report::{Report, Status, record, table};
 use crate::run::{self, Observer, RunOptions};
 
@@ -76,7 +76,8 @@ pub(super) fn options(planned: &Planned, out: Option<&Path>, jobs: Option<usize>
 }
 
 fn write_record(report: &Report, out: &Path) -> Result<(), Fault> {
-    let text = record::to_ron(report).map_err(|error| Fault::new(Exit::Fault, format!("cannot write run.ron: {error}")))?;
+    let text =
+        record::to_ron(report).map_err(|error| Fault::new(Exit::Fault, format!("cannot write run.ron: {error}")))?;
     Ok(run::write_file(&out.join("run.ron"), text.as_bytes())?)
 }
 
@@ -93,7 +94,9 @@ fn tell(report: &Report, json: bool, quiet: bool) -> Result<(), Fault> {
     for step in report.cases.iter().flat_map(|case| &case.steps) {
         if let (Some(before), Some(now)) = (&step.differs_from, &step.content) {
             let (name, before, now) = (&step.name, short(before), short(now));
-            say(&format!("{name}: gave {now}, but the cache has {before} for equal inputs: the step is not deterministic"));
+            say(&format!(
+                "{name}: gave {now}, but the cache has {before} for equal inputs: the step is not deterministic"
+            ));
         }
     }
     match report.status {

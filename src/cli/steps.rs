@@ -48,13 +48,15 @@ fn port(port: OutPort) -> String {
 
 /// The step's parameters as a schema of its own, with what it refers to.
 fn schema(step: &StepDef) -> serde_json::Value {
-    let mut generator = schemars::generate::SchemaSettings::draft07().with(|s| s.inline_subschemas = true).into_generator();
+    let mut generator =
+        schemars::generate::SchemaSettings::draft07().with(|s| s.inline_subschemas = true).into_generator();
     serde_json::to_value((step.params_schema)(&mut generator)).unwrap_or_default()
 }
 
 fn explain(step: &StepDef) -> String {
     let schema = schema(step);
-    let text = |value: &serde_json::Value, key: &str| value.get(key).and_then(|v| v.as_str()).unwrap_or_default().to_owned();
+    let text =
+        |value: &serde_json::Value, key: &str| value.get(key).and_then(|v| v.as_str()).unwrap_or_default().to_owned();
     let mut parts = vec![format!("{} (revision {})", step.name, step.revision), text(&schema, "description")];
     let mut lines = vec!["inputs".to_owned()];
     for input in step.inputs {

@@ -9,7 +9,8 @@ pub fn rows(measurement: &Measurement) -> Vec<[String; 3]> {
         let value = measurement.values.get(metric.name)?;
         Some([metric.name.to_owned(), value_text(value), unit_text(metric.unit).to_owned()])
     });
-    let others = measurement.values.iter().filter(|(name, _)| !METRICS.iter().any(|metric| metric.name == name.as_str()));
+    let others =
+        measurement.values.iter().filter(|(name, _)| !METRICS.iter().any(|metric| metric.name == name.as_str()));
     known.chain(others.map(|(name, value)| [name.clone(), value_text(value), String::new()])).collect()
 }
 

@@ -203,14 +203,16 @@ impl CaseReport {
 
     /// The metrics that `measure` steps made, by step.
     pub fn measurements(&self) -> impl Iterator<Item = (&str, &Measurement)> {
-        let metrics = |step: &'_ StepReport| step.figures.as_ref().and_then(|figures| figures.metrics.as_ref()).is_some();
+        let metrics =
+            |step: &'_ StepReport| step.figures.as_ref().and_then(|figures| figures.metrics.as_ref()).is_some();
         let steps = self.steps.iter().filter(move |step| metrics(step));
         steps.filter_map(|step| Some((step.name.as_str(), step.figures.as_ref()?.metrics.as_ref()?)))
     }
 }
 
 fn gate_section(gate: &crate::plan::Gate, outcome: &RunOutcome) -> GateSection {
-    let mut section = GateSection { step: gate.step.clone(), passed: Some(true), rows: Vec::new(), failures: Vec::new() };
+    let mut section =
+        GateSection { step: gate.step.clone(), passed: Some(true), rows: Vec::new(), failures: Vec::new() };
     for task in gate.tasks.iter().map(|task| outcome.task(*task)) {
         match task.gate_report() {
             Some(report) => {

@@ -116,7 +116,11 @@ pub fn figures_text(figures: &Figures) -> String {
         parts.push(format!("{} faces", grouped(faces)));
     }
     if let (Some(min), Some(mean)) = (figures.min_stretch, figures.mean_stretch) {
-        parts.push(format!("stretch min {} mean {}", number_text((min * 1e3).round() / 1e3), number_text((mean * 1e3).round() / 1e3)));
+        parts.push(format!(
+            "stretch min {} mean {}",
+            number_text((min * 1e3).round() / 1e3),
+            number_text((mean * 1e3).round() / 1e3)
+        ));
     }
     parts.join(", ")
 }
