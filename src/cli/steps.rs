@@ -13,16 +13,15 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Exit, Fault> {
-    match &arguments.name {
-        None => data(&list()),
-        Some(name) => match CATALOG.iter().find(|step| step.name == name) {
-            Some(step) => data(&explain(step)),
-            None => {
-                let help = suggest::did_you_mean(name, "there are", CATALOG.iter().map(|step| step.name));
-                return Err(Fault::usage(format!("there is no step `{name}`")).help_opt(help));
-            }
-        },
-    }
+    let Some(name) = &arguments.name else {
+        data(&list());
+        return Ok(Exit::Done);
+    };
+    let Some(step) = CATALOG.iter().find(|step| step.name == name) else {
+        let help = suggest::did_you_mean(name, "there are", CATALOG.iter().map(|step| step.name));
+        return Err(Fault::usage(format!("there is no step `{name}`")).help_opt(help));
+    };
+    data(&explain(step));
     Ok(Exit::Done)
 }
 

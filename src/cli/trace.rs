@@ -74,7 +74,7 @@ impl Observer for Trace {
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
         match *event {
             Event::State { node, label, state: TaskState::Running, .. } => {
-                let lane = (1..).find(|lane| !state.lanes.contains(lane)).unwrap_or(0);
+                let lane = (1..=state.lanes.len() + 1).find(|lane| !state.lanes.contains(lane)).unwrap_or(0);
                 state.lanes.insert(lane);
                 state.running.insert(node, Running { lane, label: label.to_owned(), since: now, phase: None });
             }

@@ -1,5 +1,7 @@
 //! Reports as aligned tables for a terminal.
 
+use std::fmt::Write;
+
 use comfy_table::{CellAlignment, Table};
 
 use super::measure::{number_text, rows, value_text};
@@ -62,14 +64,15 @@ fn steps(case: &CaseReport, report: &Report) -> String {
 
 fn gates(case: &CaseReport) -> String {
     let mut table = plain(&["gate", "metric", "limit", "measured", "verdict"]);
+    // Writing to a string cannot fail.
     for gate in &case.gates {
         for row in &gate.rows {
             let mut verdict = if row.passed { "passed".to_owned() } else { "FAILED".to_owned() };
             if row.fault_count > 0 {
-                verdict += &format!(", {} elements", grouped(row.fault_count));
+                let _ = write!(verdict, ", {} elements", grouped(row.fault_count));
             }
             if let Some(note) = &row.note {
-                verdict += &format!(" ({note})");
+                let _ = write!(verdict, " ({note})");
             }
             let measured = row.measured.as_ref().map_or_else(|| "undefined".to_owned(), value_text);
             table.add_row([gate.step.clone(), row.metric.clone(), row.limit.clone(), measured, verdict]);

@@ -10,7 +10,7 @@ use std::time::{Duration, SystemTime};
 
 const PREFIX: &str = ".meshmill-";
 /// Leftovers of other machines go when they are this old.
-const STALE: Duration = Duration::from_secs(24 * 60 * 60);
+const STALE: Duration = Duration::from_hours(24);
 
 /// Writes a file so that readers see the old content or all of the new one.
 pub(super) fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
@@ -32,8 +32,10 @@ pub(super) fn remove_leftovers(folder: &Path) {
     let Ok(entries) = fs::read_dir(folder) else { return };
     for entry in entries.filter_map(Result::ok) {
         let name = entry.file_name();
-        let Some(rest) = name.to_str().and_then(|name| name.strip_prefix(PREFIX)) else { continue };
-        if name.to_str().is_some_and(|name| name.ends_with(".tmp")) && is_dead(rest, &entry) {
+        let Some(rest) = name.to_str().and_then(|name| name.strip_prefix(PREFIX)?.strip_suffix(".tmp")) else {
+            continue;
+        };
+        if is_dead(rest, &entry) {
             let _ = fs::remove_file(entry.path());
         }
     }

@@ -15,7 +15,7 @@ use serde::Serialize;
 use super::{Entry, Store, StoreError, TAG_FILE, verified};
 
 /// Files that somebody may be about to name are left alone for this long.
-const GRACE: Duration = Duration::from_secs(60 * 60);
+const GRACE: Duration = Duration::from_hours(1);
 
 /// How full a store is.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]

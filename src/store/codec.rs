@@ -106,7 +106,7 @@ fn start(port: Port, capacity: usize) -> ColumnWriter {
 }
 
 fn encode_points<K>(writer: &mut ColumnWriter, points: &IdVec<K, DVec3>) {
-    writer.f64s(points.iter().flat_map(|p| p.to_array()));
+    writer.f64s(points.iter().flat_map(DVec3::to_array));
 }
 
 fn decode_points<K>(reader: &mut ColumnReader<'_>) -> Result<IdVec<K, DVec3>, CodecError> {
@@ -188,7 +188,9 @@ fn encode_carried(writer: &mut ColumnWriter, carried: &Carried) {
     if let Some(Regions { labels, names }) = regions {
         writer.u32s(labels.iter().copied());
         writer.number(names.len() as u64);
-        names.iter().for_each(|name| writer.text(name));
+        for name in names {
+            writer.text(name);
+        }
     }
     writer.u32s(marks.keys().flatten().map(|v| v.raw()));
     writer.bytes(&marks.values().flat_map(|m| [m.freedom as u8, m.cause as u8]).collect::<Vec<_>>());

@@ -47,7 +47,7 @@ const LAYOUT: &str = "v1";
 const TAG_FILE: &str = "CACHEDIR.TAG";
 const TAG_TEXT: &str = "Signature: 8a477f597d28d172789f06886806bc55\n# Results cached by meshmill.\n";
 /// A hit refreshes an entry's time only when it is older, so that a hit costs no write as a rule.
-const REFRESH_AFTER: Duration = Duration::from_secs(24 * 60 * 60);
+const REFRESH_AFTER: Duration = Duration::from_hours(24);
 
 /// Why the store could not do its work. Misses and damaged files are not errors.
 #[derive(Debug, thiserror::Error)]
