@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 use meshmill::format::{self, Element, Format, WriteOptions};
-use meshmill::mesh::{FaceId, Facet, Field, Regions, Soup, Support, VertexId, edge_key};
+use meshmill::mesh::{Carried, FaceId, Facet, Field, Regions, Soup, Support, VertexId, edge_key};
 use meshmill::watch::Watch;
 use proptest::prelude::*;
 
@@ -90,6 +90,24 @@ fn inp_brings_faces_and_sets_back() {
     }
 }
 
+#[test]
+fn msh_brings_groups_and_fields_back() {
+    let mut soup = rich_sample();
+    for format in [Format::Msh, Format::Msh22] {
+        for options in [binary(), text(), WriteOptions { element: Some(Element::S6), ..binary() }] {
+            let back = read(format, &write(format, &soup, &options)).expect("reads");
+            let mut expected = rich_sample();
+            // Regions are physical groups like others.
+            expected.carried.regions = None;
+            expected.carried.groups.faces.insert("rubber".into(), vec![f(0)]);
+            expected.carried.groups.faces.insert("steel & <iron>".into(), vec![f(1)]);
+            assert_eq!(back, expected, "{format:?} {options:?}");
+        }
+    }
+    soup.carried = Carried::default();
+    assert_eq!(read(Format::Msh, &write(Format::Msh, &soup, &text())), Ok(soup));
+}
+
 fn soups() -> impl Strategy<Value = Soup> {
     let points = prop::collection::vec(prop::array::uniform3(-1e3..1e3_f64), 4..20);
     let faces = prop::collection::vec((prop::array::uniform4(0..1000_u32), any::<bool>(), any::<u8>()), 1..24);
@@ -132,6 +150,15 @@ proptest! {
     }
 
     #[test]
+    fn any_soup_comes_back_from_msh(soup in soups(), raw in any::<bool>()) {
+        let options = if raw { binary() } else { text() };
+        prop_assert_eq!(read(Format::Msh, &write(Format::Msh, &soup, &options)), Ok(soup.clone()));
+        let back = read(Format::Msh22, &write(Format::Msh22, &soup, &options)).expect("reads");
+        prop_assert_eq!(&back.points, &soup.points);
+        prop_assert_eq!(&back.carried.groups.vertices, &soup.carried.groups.vertices);
+    }
+
+    #[test]
     fn damaged_files_give_errors_and_never_panic(
         seed in 0..FORMATS.len(), cut in 0.0..1.0_f64, at in 0.0..1.0_f64, byte in any::<u8>(), raw in any::<bool>(),
     ) {
@@ -149,4 +176,4 @@ proptest! {
 }
 
 /// The formats that this file tests.
-const FORMATS: &[Format] = &[Format::Vtu, Format::Inp];
+const FORMATS: &[Format] = &[Format::Vtu, Format::Inp, Format::Msh, Format::Msh22];

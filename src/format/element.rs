@@ -87,6 +87,11 @@ impl Elements {
         Self { faces: Vec::new(), roles: vec![0; nodes], counts: ReadCounts::default() }
     }
 
+    /// Makes room for more nodes of the file, `nodes` in all.
+    pub(super) fn make_room(&mut self, nodes: usize) {
+        self.roles.resize(nodes, 0);
+    }
+
     /// Adds one element; `nodes` are positions that the caller has checked, at least as many as the shape has corners.
     pub(super) fn add(&mut self, shape: Shape, nodes: &[u32], points: &[DVec3]) -> Placed {
         let corners = &nodes[..shape.corners(nodes.len())];

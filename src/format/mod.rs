@@ -10,6 +10,7 @@ mod element;
 mod error;
 mod group_text;
 mod inp;
+mod msh;
 mod obj;
 mod off;
 mod ply;
@@ -46,6 +47,10 @@ pub enum Format {
     Vtu,
     /// Abaqus and CalculiX input.
     Inp,
+    /// Gmsh 4.1; reading takes 2.2 as well.
+    Msh,
+    /// Gmsh 2.2.
+    Msh22,
 }
 
 /// What a format is and does; one beside each reader and writer.
@@ -134,7 +139,8 @@ impl std::fmt::Debug for WriteOptions<'_> {
 
 impl Format {
     /// All formats.
-    pub const ALL: &'static [Self] = &[Self::Stl, Self::Obj, Self::Ply, Self::Off, Self::Vtu, Self::Inp];
+    pub const ALL: &'static [Self] =
+        &[Self::Stl, Self::Obj, Self::Ply, Self::Off, Self::Vtu, Self::Inp, Self::Msh, Self::Msh22];
 
     fn def(self) -> &'static FormatDef {
         match self {
@@ -144,6 +150,8 @@ impl Format {
             Self::Off => &off::DEF,
             Self::Vtu => &vtu::DEF,
             Self::Inp => &inp::DEF,
+            Self::Msh => &msh::DEF,
+            Self::Msh22 => &msh::DEF_22,
         }
     }
 

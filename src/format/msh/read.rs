@@ -1,0 +1,323 @@
+//! Reads a Gmsh file section by section into a model, and makes a mesh of it.
+
+use std::collections::BTreeMap;
+
+use glam::DVec3;
+use rustc_hash::FxHashMap;
+
+use super::super::ReadCounts;
+use super::super::binary::ByteOrder;
+use super::super::element::{Elements, Placed, Shape};
+use super::super::error::{FormatError, Place, Reason};
+use super::input::Input;
+use super::{element_type, is_quad, v2, v4};
+use crate::mesh::{EdgeKey, FaceId, Field, Soup, Support, VertexId};
+use crate::watch::Watch;
+
+/// Elements between two looks at the watch.
+const STRIDE: usize = 1 << 16;
+
+/// Groups of an element on average; a hostile file could put every element in many.
+const MOST_GROUPS: usize = 64;
+
+/// The members of a physical group or an entity.
+#[derive(Debug, Default)]
+struct Members {
+    faces: Vec<FaceId>,
+    edges: Vec<EdgeKey>,
+    vertices: Vec<VertexId>,
+}
+
+impl Members {
+    fn add(&mut self, placed: &Placed) {
+        match placed {
+            Placed::Faces(range) => self.faces.extend(range.clone().map(FaceId::new)),
+            Placed::Edge(edge) => self.edges.push(*edge),
+            Placed::Vertex(vertex) => self.vertices.push(*vertex),
+            Placed::Nothing => {}
+        }
+    }
+}
+
+/// A data section.
+#[derive(Debug)]
+struct Data {
+    name: String,
+    support: Support,
+    components: usize,
+    rows: Vec<(i64, Vec<f64>)>,
+}
+
+/// What the sections say.
+#[derive(Debug, Default)]
+pub(super) struct Model<'w> {
+    names: BTreeMap<(i64, i64), String>,
+    /// The physical groups of each entity, by dimension and tag (version 4).
+    pub(super) physicals: BTreeMap<(i64, i64), Vec<i64>>,
+    points: Vec<DVec3>,
+    nodes: FxHashMap<i64, u32>,
+    elements: Elements,
+    groups: BTreeMap<(i64, i64), Members>,
+    entities: BTreeMap<(i64, i64), Members>,
+    /// Faces with their element numbers.
+    face_tags: Vec<(i64, u32)>,
+    data: Vec<Data>,
+    count: usize,
+    memberships: usize,
+    watch: Option<&'w Watch>,
+}
+
+/// Reads a Gmsh file.
+pub(super) fn read(bytes: &[u8], watch: &Watch) -> Result<(Soup, ReadCounts), FormatError> {
+    let mut input = Input::new(bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes));
+    let mut model = Model { watch: Some(watch), ..Model::default() };
+    let version_4 = mesh_format(&mut input)?;
+    while let Some(word) = input.word() {
+        let Some(name) = word.strip_prefix(b"$") else {
+            return Err(FormatError::unexpected(input.place(), "the beginning of a section", word));
+        };
+        match name {
+            b"PhysicalNames" => model.physical_names(&mut input)?,
+            b"Entities" if version_4 => v4::entities(&mut input, &mut model)?,
+            b"Nodes" if version_4 => v4::nodes(&mut input, &mut model)?,
+            b"Elements" if version_4 => v4::elements(&mut input, &mut model)?,
+            b"Nodes" => v2::nodes(&mut input, &mut model, false)?,
+            b"ParametricNodes" => v2::nodes(&mut input, &mut model, true)?,
+            b"Elements" => v2::elements(&mut input, &mut model)?,
+            b"NodeData" => model.data(&mut input, Support::Vertex)?,
+            b"ElementData" => model.data(&mut input, Support::Face)?,
+            _ => {
+                if !input.skip_behind(&[b"$End", name].concat()) {
+                    return Err(FormatError::new(input.place(), Reason::Truncated { within: "a section" }));
+                }
+                continue;
+            }
+        }
+        let end = input.need_word("a section")?;
+        if end.strip_prefix(b"$End") != Some(name) {
+            return Err(FormatError::unexpected(input.place(), "the end of the section", end));
+        }
+    }
+    model.finish()
+}
+
+/// Reads the head; `true` for version 4.1.
+fn mesh_format(input: &mut Input<'_>) -> Result<bool, FormatError> {
+    let first = input.need_word("the head")?;
+    if first != b"$MeshFormat" {
+        return Err(FormatError::unexpected(input.place(), "$MeshFormat", first));
+    }
+    let version = input.need_word("the version")?;
+    let version_4 = match version {
+        b"2" | b"2.0" | b"2.1" | b"2.2" => false,
+        b"4.1" => true,
+        other => {
+            let what = format!("version {}", String::from_utf8_lossy(other));
+            return Err(FormatError::new(input.place(), Reason::Unsupported(what))
+                .with_remedy("save it in Gmsh as version 4.1 or 2.2: gmsh -save -format msh41 FILE"));
+        }
+    };
+    let binary = input.text_integer("the file type")? == 1;
+    let size = input.text_integer("the data size")?;
+    if size != 8 {
+        return Err(FormatError::new(input.place(), Reason::Unsupported(format!("a data size of {size}"))));
+    }
+    if binary {
+        input.end_line();
+        input.order = Some(ByteOrder::Little);
+        input.order = match input.int("the mark of the byte order")? {
+            1 => Some(ByteOrder::Little),
+            0x0100_0000 => Some(ByteOrder::Big),
+            other => {
+                return Err(FormatError::unexpected(
+                    input.place(),
+                    "a one that tells the byte order",
+                    other.to_string().as_bytes(),
+                ));
+            }
+        };
+    }
+    match input.need_word("the head")? {
+        b"$EndMeshFormat" => Ok(version_4),
+        other => Err(FormatError::unexpected(input.place(), "$EndMeshFormat", other)),
+    }
+}
+
+impl Model<'_> {
+    fn physical_names(&mut self, input: &mut Input<'_>) -> Result<(), FormatError> {
+        for _ in 0..input.text_integer("a number of names")? {
+            let dimension = input.text_integer("a dimension")?;
+            let tag = input.text_integer("a physical tag")?;
+            let name = input.quoted();
+            self.names.insert((dimension, tag), name);
+        }
+        Ok(())
+    }
+
+    /// Makes room for the elements' nodes; nodes come before elements.
+    pub(super) fn end_of_nodes(&mut self) {
+        self.elements.make_room(self.points.len());
+    }
+
+    /// Adds a node.
+    pub(super) fn node(&mut self, tag: i64, point: DVec3, place: Place) -> Result<(), FormatError> {
+        let next = self.points.len();
+        if next >= u32::MAX as usize {
+            return Err(FormatError::new(place, Reason::TooMany { what: "nodes", limit: u64::from(u32::MAX) - 1 }));
+        }
+        if self.nodes.insert(tag, next as u32).is_some() {
+            return Err(FormatError::new(place, Reason::Duplicate { what: "node", id: tag }));
+        }
+        self.points.push(point);
+        Ok(())
+    }
+
+    /// The position of a node.
+    pub(super) fn position(&self, tag: i64, place: Place) -> Result<u32, FormatError> {
+        let missing =
+            || FormatError::new(place, Reason::OutOfRange { what: "node", index: tag, count: self.nodes.len() as u64 });
+        self.nodes.get(&tag).copied().ok_or_else(missing)
+    }
+
+    /// Adds an element of the entity with this tag; `nodes` are positions, as many as the type has.
+    pub(super) fn element(&mut self, tag: i64, kind: i64, entity: i64, nodes: &[u32]) -> Result<Placed, FormatError> {
+        self.count += 1;
+        if self.count.is_multiple_of(STRIDE) {
+            self.watch.map_or(Ok(()), Watch::check)?;
+        }
+        let dimension = element_type(kind).map_or(3, |(d, _)| d);
+        let shape = match dimension {
+            0 => Shape::Point,
+            1 => Shape::Line,
+            2 if is_quad(kind) => Shape::Quad,
+            2 => Shape::Triangle,
+            _ => Shape::Volume,
+        };
+        let placed = self.elements.add(shape, nodes, &self.points);
+        if let Placed::Faces(range) = &placed {
+            self.face_tags.push((tag, range.start as u32));
+        }
+        self.entities.entry((i64::from(dimension), entity)).or_default().add(&placed);
+        Ok(placed)
+    }
+
+    /// Puts an element into a physical group; the tag's sign tells an orientation, which groups do not have.
+    pub(super) fn group(&mut self, kind: i64, tag: i64, placed: &Placed) -> Result<(), FormatError> {
+        self.memberships += 1;
+        let limit = MOST_GROUPS * (self.count + 1024);
+        if self.memberships > limit {
+            return Err(FormatError::new(
+                Place::File,
+                Reason::TooMany { what: "members of groups", limit: limit as u64 },
+            ));
+        }
+        let dimension = element_type(kind).map_or(3, |(d, _)| d);
+        self.groups.entry((i64::from(dimension), tag.abs())).or_default().add(placed);
+        Ok(())
+    }
+
+    fn data(&mut self, input: &mut Input<'_>, support: Support) -> Result<(), FormatError> {
+        let mut name = String::new();
+        let strings = input.text_integer("a number of strings")?;
+        for i in 0..input.claim(strings, 1, 1, "strings")? {
+            input.end_line();
+            let text = input.quoted();
+            if i == 0 {
+                name = text;
+            }
+        }
+        for _ in 0..input.text_integer("a number of reals")? {
+            input.text_number("a real tag")?;
+        }
+        let count = input.text_integer("a number of integers")?;
+        let (mut components, mut rows) = (1, 0);
+        for i in 0..count {
+            let value = input.text_integer("an integer tag")?;
+            match i {
+                1 => components = value,
+                2 => rows = value,
+                _ => {}
+            }
+        }
+        input.end_line();
+        if !(1..=9).contains(&components) {
+            return Err(FormatError::unexpected(input.place(), "1 to 9 components", components.to_string().as_bytes()));
+        }
+        let components = components as usize;
+        let count = input.claim(rows, 2 + 2 * components, 4 + 8 * components, "rows of data")?;
+        let mut data = Data { name, support, components, rows: Vec::with_capacity(count) };
+        for _ in 0..count {
+            let tag = input.int("a node or element number")?;
+            let row: Result<Vec<f64>, _> = (0..components).map(|_| input.float("a value")).collect();
+            data.rows.push((tag, row?));
+        }
+        self.data.push(data);
+        Ok(())
+    }
+
+    fn finish(mut self) -> Result<(Soup, ReadCounts), FormatError> {
+        let mut soup = Soup { points: std::mem::take(&mut self.points).into(), ..Soup::default() };
+        let faces = self.elements.faces.len();
+        for data in std::mem::take(&mut self.data) {
+            let field = self.field(data, soup.points.len(), faces);
+            soup.carried.set_field(field);
+        }
+        self.name_groups(&mut soup);
+        let counts = self.elements.finish(&mut soup)?;
+        Ok((soup, counts))
+    }
+
+    /// Elements without a row have NaN, which no file can hold: the value is not known.
+    fn field(&self, data: Data, points: usize, faces: usize) -> Field {
+        let Data { name, support, components, rows } = data;
+        let tags: FxHashMap<i64, u32> = match support {
+            Support::Vertex => FxHashMap::default(),
+            Support::Face => self.face_tags.iter().copied().collect(),
+        };
+        let (known, len) = match support {
+            Support::Vertex => (&self.nodes, points),
+            Support::Face => (&tags, faces),
+        };
+        let mut values = vec![f64::NAN; len * components];
+        for (tag, row) in rows {
+            if let Some(&at) = known.get(&tag) {
+                values[at as usize * components..][..components].copy_from_slice(&row);
+            }
+        }
+        Field { name, support, components, values }
+    }
+
+    fn name_groups(&mut self, soup: &mut Soup) {
+        let names = std::mem::take(&mut self.names);
+        let mut named = Vec::new();
+        if self.groups.is_empty() {
+            let surfaces = self.entities.values().filter(|m| !m.faces.is_empty()).count();
+            for ((dimension, tag), members) in std::mem::take(&mut self.entities) {
+                match dimension {
+                    1 => named.push((format!("curve_{tag}"), members)),
+                    2 if surfaces > 1 => named.push((format!("surface_{tag}"), members)),
+                    _ => {}
+                }
+            }
+        }
+        for (key, members) in std::mem::take(&mut self.groups) {
+            named.push((names.get(&key).cloned().unwrap_or_else(|| format!("physical_{}", key.1)), members));
+        }
+        let groups = &mut soup.carried.groups;
+        for (name, members) in named {
+            extend(&mut groups.faces, &name, members.faces);
+            extend(&mut groups.edges, &name, members.edges);
+            extend(&mut groups.vertices, &name, members.vertices);
+        }
+    }
+}
+
+fn extend<T: Ord>(groups: &mut BTreeMap<String, Vec<T>>, name: &str, members: Vec<T>) {
+    if members.is_empty() {
+        return;
+    }
+    let all = groups.entry(name.to_owned()).or_default();
+    all.extend(members);
+    all.sort_unstable();
+    all.dedup();
+}
