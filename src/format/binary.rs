@@ -1,6 +1,5 @@
 //! Numbers of binary formats: a bounds-checked reader in either byte order.
 
-#![expect(dead_code, reason = "the formats that use the rest follow")]
 
 use super::error::{FormatError, Place, Reason};
 
