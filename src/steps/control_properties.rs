@@ -16,15 +16,16 @@ use std::sync::Arc;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::mesh::bvh::TriangleBvh;
 use crate::mesh::halfedge::EnterError;
 use crate::mesh::{FreedomError, LockRules, Surface, resolve_freedom};
 use crate::step::{
     Artifact, InputDef, Inputs, Length, Locks, OutPort, OutputDef, Port, Produced, ResolvedSizing, Sizing, StepFailure,
 };
-use crate::technique::collapse::session::{Recount, Setup, ToleranceMode, Violation, open, recount};
+use crate::technique::collapse::session::{
+    Recount, Setup, ToleranceMode, Violation, diagonal, open, recount, reference_tree,
+};
 use crate::technique::collapse::{CollapseRules, Editor, Ending, Limits, Order, Priority, SizeField, simplify};
-use crate::technique::remesh::{optimise, raise_stretch};
+use crate::technique::remesh::{coarsen, raise_stretch};
 use crate::watch::{Cancelled, Watch};
 
 /// Simplifies a surface while error, element shape, element size and valence stay within limits.
@@ -185,8 +186,8 @@ pub fn control_properties(
     watch: &Watch,
 ) -> Result<(Surface, ControlPropertiesStats), ControlPropertiesError> {
     let freedom = resolve_freedom(input.surface, &input.locks)?;
-    let tree = TriangleBvh::of_surface(input.reference);
-    let setup = setup(&input, params, tree.bounds().diagonal())?;
+    let tree = reference_tree(params.tolerance_mode, input.reference);
+    let setup = setup(&input, params, diagonal(input.reference))?;
     let (tolerance, limits) = (setup.tolerance, setup.limits.clone());
     let mut editor = open(input.surface, &freedom, input.reference, &tree, setup)?;
     let ending = run_phases(&mut editor, params, watch)?;
@@ -218,16 +219,11 @@ pub fn control_properties(
     Ok((left.surface, stats))
 }
 
-/// Stretch below which optimised collapses do not go while there is anything better to do: twice the usual floor.
-const COMFORT: [f64; 3] = [0.55, 0.45, 0.35];
-
-/// Rounds of flips and relaxation between collapses, and at the end.
-const ROUNDS: [usize; 2] = [2, 8];
-
 fn run_phases(editor: &mut Editor<'_>, params: &ControlPropertiesParams, watch: &Watch) -> Result<Ending, Cancelled> {
     let is_certified = params.tolerance_mode == ToleranceMode::Distance;
     let rules = CollapseRules {
         min_stretch: params.min_stretch,
+        mean_stretch: 0.0,
         must_improve: false,
         order: if is_certified { Order::OnSurface } else { Order::Printed },
         priority: Priority::SmallFirst { size: 1.0 },
@@ -237,21 +233,7 @@ fn run_phases(editor: &mut Editor<'_>, params: &ControlPropertiesParams, watch: 
     if !params.optimize.unwrap_or(is_certified) {
         return simplify(editor, &rules, target, watch);
     }
-    let mut ending = Ending::Exhausted;
-    for comfort in COMFORT {
-        let rules = CollapseRules { min_stretch: comfort.max(params.min_stretch), ..rules };
-        ending = simplify(editor, &rules, target, watch)?;
-        optimise(editor, ROUNDS[0], watch)?;
-        if ending == Ending::Target {
-            break;
-        }
-    }
-    if ending == Ending::Exhausted && target > 0 {
-        ending = simplify(editor, &rules, target, watch)?;
-    }
-    optimise(editor, ROUNDS[1], watch)?;
-    raise_stretch(editor, params.min_stretch, &rules, watch)?;
-    Ok(ending)
+    coarsen(editor, &rules, target, watch)
 }
 
 fn status(recount: &Recount, ending: Ending, has_target: bool) -> Status {

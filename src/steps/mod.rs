@@ -1,6 +1,7 @@
 //! The catalog: every step that a recipe can use, one file and one line each.
 
 pub mod control_properties;
+pub mod improve_quality;
 pub mod measure;
 pub mod read;
 pub mod repair;
@@ -13,6 +14,7 @@ pub static CATALOG: &[StepDef] = &[
     StepDef::of::<read::Step>(),
     StepDef::of::<repair::Step>(),
     StepDef::of::<subdivide::Step>(),
+    StepDef::of::<improve_quality::Step>(),
     StepDef::of::<control_properties::Step>(),
     StepDef::of::<measure::Step>(),
 ];

@@ -15,7 +15,7 @@ use super::id::{EdgeId, VertexId};
 
 pub use collapse::{CollapsePlan, Placement, Ring, check_collapse, collapse};
 pub use flip::{FlipPlan, check_flip, flip};
-pub use relocate::{check_relocate, relocate};
+pub use relocate::{check_relocate, relocate, slide};
 pub use split::{SplitPlan, check_split, split};
 
 /// Why an edit is not done.

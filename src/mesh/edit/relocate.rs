@@ -28,3 +28,16 @@ pub fn relocate(mesh: &mut HalfedgeMesh, vertex: VertexId, to: DVec3) -> Result<
     mesh.bump_star(vertex);
     Ok(())
 }
+
+/// Moves a vertex along its curve. That the new place lies on the curve is the caller's to see to.
+///
+/// # Errors
+/// [`Refusal::Freedom`] for a vertex that is free or kept; nothing has moved then.
+pub fn slide(mesh: &mut HalfedgeMesh, vertex: VertexId, to: DVec3) -> Result<(), Refusal> {
+    if mesh.vertex_freedom(vertex) != Freedom::OnCurve {
+        return Err(Refusal::Freedom { vertex });
+    }
+    mesh.points[vertex] = to;
+    mesh.bump_star(vertex);
+    Ok(())
+}

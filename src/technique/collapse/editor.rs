@@ -30,6 +30,8 @@ const HAS_NORMAL: f64 = 0.05;
 pub struct CollapseRules {
     /// Least stretch of the new faces; where a face of the old star is below it, no less than that one.
     pub min_stretch: f64,
+    /// Least mean stretch of the new faces; where the mean of the old star is below it, no less than that.
+    pub mean_stretch: f64,
     /// Whether the least stretch of the star must rise.
     pub must_improve: bool,
     /// Candidate order.
@@ -254,7 +256,8 @@ impl<'a> Editor<'a> {
             after.add(shape, size);
         }
         let improves = !rules.must_improve || after.stretch_min > before.stretch_min;
-        (improves && !self.folds()).then_some(after)
+        let even = after.mean() >= rules.mean_stretch.min(before.mean());
+        (improves && even && !self.folds()).then_some(after)
     }
 
     /// Whether a face of the patch turns too far: against itself where it has a normal, else against the old star.

@@ -62,6 +62,14 @@ impl Keeper<'_> {
             Self::QuadricSum { .. } | Self::QuadricRms { .. } => None,
         }
     }
+
+    /// The point of the reference's curves nearest to `p`, where the tolerance has a reference.
+    pub fn project_to_curve(&self, p: DVec3) -> Option<DVec3> {
+        match self {
+            Self::Distance { curves, .. } => curves.project(p),
+            Self::QuadricSum { .. } | Self::QuadricRms { .. } => None,
+        }
+    }
 }
 
 /// Reference curves and how far marked edges may lie from them.

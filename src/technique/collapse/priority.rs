@@ -49,9 +49,14 @@ impl Tally {
         self.inverse_size_sum += if size > 0.0 { 1.0 / size } else { 0.0 };
     }
 
+    /// Mean stretch.
+    pub fn mean(&self) -> f64 {
+        if self.faces == 0 { 0.0 } else { self.stretch_sum / self.faces as f64 }
+    }
+
     /// Equation 8: least times mean stretch.
     pub fn quality(&self) -> f64 {
-        if self.faces == 0 { 0.0 } else { self.stretch_min * self.stretch_sum / self.faces as f64 }
+        if self.faces == 0 { 0.0 } else { self.stretch_min * self.mean() }
     }
 }
 

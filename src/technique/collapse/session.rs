@@ -12,7 +12,7 @@ use super::envelope::Envelope;
 use super::keeper::{Curves, Keeper};
 use super::limits::{Limits, SizeField};
 use crate::mesh::bvh::TriangleBvh;
-use crate::mesh::geometry::{angle, stretch, triangle_size};
+use crate::mesh::geometry::{Aabb, angle, stretch, triangle_size};
 use crate::mesh::halfedge::{EnterError, HalfedgeMesh};
 use crate::mesh::{FaceId, Freedom, IdVec, ResolvedFreedom, Surface, VertexId, edge_key};
 
@@ -45,7 +45,20 @@ pub struct Setup {
     pub limits: Limits,
 }
 
-/// Opens a guarded workshop on `surface`, held against `reference` whose faces are in `tree`.
+/// The hierarchy over the reference that a tolerance of this meaning needs: an empty one for the quadrics.
+pub fn reference_tree(mode: ToleranceMode, reference: &Surface) -> TriangleBvh {
+    match mode {
+        ToleranceMode::Distance => TriangleBvh::of_surface(reference),
+        ToleranceMode::QuadricSum | ToleranceMode::QuadricRms => TriangleBvh::new(Vec::new()),
+    }
+}
+
+/// The diagonal of a surface's bounding box.
+pub fn diagonal(surface: &Surface) -> f64 {
+    Aabb::of(surface.points.iter().copied()).diagonal()
+}
+
+/// Opens a guarded workshop on `surface`, held against `reference`; `tree` is [`reference_tree`].
 ///
 /// # Errors
 /// A surface that is no oriented 2-manifold.

@@ -17,7 +17,7 @@ use glam::DVec3;
 use crate::mesh::geometry::area_vector;
 use crate::mesh::halfedge::edge_of;
 use crate::mesh::{EdgeId, FaceId, Freedom, VertexId};
-use crate::technique::collapse::{CollapseRules, Editor};
+use crate::technique::collapse::{CollapseRules, Editor, Ending, simplify};
 use crate::watch::{Cancelled, Watch};
 
 /// Rounds after which a phase ends even if it still finds something: each round gains, but ever less.
@@ -30,7 +30,7 @@ pub fn raise_stretch(
     rules: &CollapseRules,
     watch: &Watch,
 ) -> Result<usize, Cancelled> {
-    let rules = CollapseRules { must_improve: true, min_stretch: threshold, ..*rules };
+    let rules = CollapseRules { must_improve: true, min_stretch: threshold, mean_stretch: 0.0, ..*rules };
     let mut left = usize::MAX;
     for _ in 0..MOST_ROUNDS {
         let bad = faces_below(editor, threshold);
@@ -138,6 +138,44 @@ fn edges_by_length(editor: &Editor<'_>, f: FaceId) -> [EdgeId; 3] {
     edges
 }
 
+/// Least and mean stretch that optimised coarsening asks of new stars, in falling steps.
+const COMFORT: [(f64, f64); 3] = [(0.7, 0.88), (0.6, 0.83), (0.5, 0.78)];
+
+/// Rounds of flips and relaxation between collapses, and at the end.
+const ROUNDS: [usize; 2] = [2, 8];
+
+/// Coarsens to `target` faces, or until no edge is valid, with optimisation in between.
+///
+/// The stretch that new faces need starts high and falls in steps, so that poor collapses are only done when a target
+/// asks for them; without a target they are not done.
+pub fn coarsen(
+    editor: &mut Editor<'_>,
+    rules: &CollapseRules,
+    target: usize,
+    watch: &Watch,
+) -> Result<Ending, Cancelled> {
+    let mut ending = Ending::Exhausted;
+    for (least, mean) in COMFORT {
+        let rules = CollapseRules { min_stretch: least.max(rules.min_stretch), mean_stretch: mean, ..*rules };
+        ending = simplify(editor, &rules, target, watch)?;
+        optimise(editor, ROUNDS[0], watch)?;
+        if ending == Ending::Target {
+            break;
+        }
+    }
+    let (mut comfort, _) = COMFORT[COMFORT.len() - 1];
+    while ending == Ending::Exhausted && target > 0 && comfort > rules.min_stretch {
+        comfort = (comfort - 0.1).max(rules.min_stretch);
+        ending = simplify(editor, &CollapseRules { min_stretch: comfort, ..*rules }, target, watch)?;
+        optimise(editor, 1, watch)?;
+    }
+    optimise(editor, ROUNDS[1], watch)?;
+    for threshold in [rules.min_stretch, 0.35_f64.max(rules.min_stretch), 0.45_f64.max(rules.min_stretch)] {
+        raise_stretch(editor, threshold, rules, watch)?;
+    }
+    Ok(ending)
+}
+
 /// Rounds of splits, flips and relaxation. Returns the number of edits that gained in the last round.
 pub fn optimise(editor: &mut Editor<'_>, rounds: usize, watch: &Watch) -> Result<usize, Cancelled> {
     let mut last = 0;
@@ -204,12 +242,18 @@ fn relax_vertices(editor: &mut Editor<'_>, watch: &Watch) -> Result<usize, Cance
     Ok(moves)
 }
 
-/// Tangential relaxation of a free vertex: towards the area-weighted centroid of its star, back onto the reference.
+/// Relaxation of a vertex: a free one tangentially, one on a curve along it.
 fn relax(editor: &mut Editor<'_>, v: VertexId, gain: Gain) -> bool {
-    let mesh = editor.mesh();
-    if mesh.vertex_freedom(v) != Freedom::Free {
-        return false;
+    match editor.mesh().vertex_freedom(v) {
+        Freedom::Free => relax_tangentially(editor, v, gain),
+        Freedom::OnCurve => relax_along_curve(editor, v, gain),
+        Freedom::Keep => false,
     }
+}
+
+/// Towards the area-weighted centroid of the star, back onto the reference.
+fn relax_tangentially(editor: &mut Editor<'_>, v: VertexId, gain: Gain) -> bool {
+    let mesh = editor.mesh();
     let at = mesh.point(v);
     let (mut centre, mut normal, mut weight) = (DVec3::ZERO, DVec3::ZERO, 0.0);
     for f in mesh.faces_around(v) {
@@ -229,6 +273,20 @@ fn relax(editor: &mut Editor<'_>, v: VertexId, gain: Gain) -> bool {
     for share in [1.0, 0.4] {
         let wish = at + share * tangential;
         let to = editor.keeper.project(wish).unwrap_or(wish);
+        if editor.try_move(v, to, gain) {
+            return true;
+        }
+    }
+    false
+}
+
+/// Towards the middle between the neighbours on the curve, back onto the reference's curve.
+fn relax_along_curve(editor: &mut Editor<'_>, v: VertexId, gain: Gain) -> bool {
+    let Some([a, b]) = editor.curve_neighbours(v) else { return false };
+    let mesh = editor.mesh();
+    let (at, middle) = (mesh.point(v), 0.5 * (mesh.point(a) + mesh.point(b)));
+    for share in [1.0, 0.5, 0.2] {
+        let Some(to) = editor.keeper.project_to_curve(at + share * (middle - at)) else { return false };
         if editor.try_move(v, to, gain) {
             return true;
         }

@@ -2,12 +2,12 @@
 
 use glam::DVec3;
 
-use crate::mesh::edit::{check_flip, check_relocate, check_split, flip, relocate, split};
+use crate::mesh::edit::{check_flip, check_split, flip, relocate, slide, split};
 use crate::mesh::geometry::{area_vector, stretch, triangle_size};
-use crate::mesh::halfedge::{halfedge_of, twin};
-use crate::mesh::{EdgeId, FaceId, VertexId};
-use crate::technique::collapse::Editor;
+use crate::mesh::halfedge::{edge_of, halfedge_of, twin};
+use crate::mesh::{EdgeId, FaceId, Freedom, HalfedgeId, VertexId};
 use crate::technique::collapse::priority::Tally;
+use crate::technique::collapse::{Editor, Keeper};
 
 /// Without a certified distance, an edge is flipped only where its faces differ by less than 5 degrees.
 const FLAT_COSINE: f64 = 0.996;
@@ -136,9 +136,14 @@ impl Editor<'_> {
         })
     }
 
-    /// Moves a free vertex where all tests admit it and it gains.
+    /// Moves a vertex, on a curve along it, where all tests admit it and it gains.
     pub fn try_move(&mut self, v: VertexId, to: DVec3, gain: Gain) -> bool {
-        if check_relocate(&self.mesh, v).is_err() || !to.is_finite() || !self.quadrics_admit(v, to) {
+        let may = match self.mesh.vertex_freedom(v) {
+            Freedom::Free => self.quadrics_admit(v, to),
+            Freedom::OnCurve => self.may_slide(v, to),
+            Freedom::Keep => false,
+        };
+        if !may || !to.is_finite() {
             return false;
         }
         self.patch.clear();
@@ -153,12 +158,30 @@ impl Editor<'_> {
         if !self.gains(&before, gain) || self.folds() || !self.patch_admitted() {
             return false;
         }
-        if relocate(&mut self.mesh, v, to).is_err() {
+        let moved = match self.mesh.vertex_freedom(v) {
+            Freedom::OnCurve => slide(&mut self.mesh, v, to),
+            Freedom::Free | Freedom::Keep => relocate(&mut self.mesh, v, to),
+        };
+        if moved.is_err() {
             return false;
         }
         self.counts.moves += 1;
         self.settle();
         true
+    }
+
+    /// Whether the curve through the vertex stays near the reference's curves when it goes to `to`.
+    fn may_slide(&self, v: VertexId, to: DVec3) -> bool {
+        let Keeper::Distance { curves, .. } = &self.keeper else { return false };
+        self.curve_neighbours(v).is_some_and(|ends| ends.iter().all(|&w| curves.admit([to, self.mesh.point(w)])))
+    }
+
+    /// The neighbours of a vertex along its only curve.
+    pub fn curve_neighbours(&self, v: VertexId) -> Option<[VertexId; 2]> {
+        let is_curve = |h: &HalfedgeId| self.mesh.edge_freedom(edge_of(*h)) != Freedom::Free;
+        let mut ends = self.mesh.outgoing(v).filter(is_curve).map(|h| self.mesh.target(h));
+        let pair = [ends.next()?, ends.next()?];
+        ends.next().is_none().then_some(pair)
     }
 
     /// The tally of live faces.

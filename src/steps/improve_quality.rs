@@ -1,0 +1,332 @@
+//! Improves element quality by refining and collapsing.
+//!
+//! Date, Nagai, Hirose, Ohta: High-Quality and Property Controlled Finite Element Mesh Generation From Triangular Meshes
+//! Using the Multiresolution Technique, JCISE 2005, section 4. Selective subdivision first, until no edge is longer than
+//! `max-edge`: the freedom that collapse needs. Then the collapse that improves its star most, relative to its size,
+//! again and again while the tolerance allows.
+//!
+//! Invariants: topology, marked curves, kept elements; no new self-intersection. In `distance` mode the surface stays
+//! within the tolerance of the reference, both ways, at every moment. No collapse leaves a face below a stretch of 0.2
+//! where its star had none.
+//! Cost: O(F log F) in the faces after refinement; a needle of length `l` gives at least `l / max-edge` of them.
+//! Departures: without `target-faces` the result keeps `max-edge`, since nothing else would stop on flat parts; the
+//! floor of 0.2; with `optimize`, flips and relaxation in between.
+
+use std::sync::Arc;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::mesh::halfedge::EnterError;
+use crate::mesh::{FreedomError, IdVec, LockRules, Surface, resolve_freedom};
+use crate::step::{
+    Artifact, InputDef, Inputs, Length, Locks, OutPort, OutputDef, Port, Produced, ResolvedSizing, Sizing, StepFailure,
+};
+use crate::technique::collapse::session::{Setup, ToleranceMode, diagonal, open, recount, reference_tree};
+use crate::technique::collapse::{CollapseRules, Editor, Ending, Limits, Order, Priority, SizeField, simplify};
+use crate::technique::refine::{MAX_FACES, MaxEdge, RefineError, refine};
+use crate::technique::remesh::coarsen;
+use crate::watch::{Cancelled, Watch};
+
+/// Stretch that collapses do not fall below where their star was above it: the usual floor for analysis.
+const FLOOR: f64 = 0.2;
+
+/// Improves element quality: refines to `max-edge`, then collapses what improves the elements most.
+///
+/// Use it first on tessellations full of slivers; `subdivide` and `control-properties` follow.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default, rename_all = "kebab-case")]
+pub struct ImproveQualityParams {
+    /// Edges are halved until none is longer; about the size of the elements wanted. Default: no refinement.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub max_edge: Option<Sizing>,
+    /// How far the result may lie from `reference`; see `tolerance-mode` for its meaning and unit. Default 0.2 % of the
+    /// reference's diagonal.
+    pub tolerance: Length,
+    /// What `tolerance` means. Default `"distance"`. In `"quadric-sum"` it is a squared length, given as a number.
+    pub tolerance_mode: ToleranceMode,
+    /// How far marked curves may move. Default: half of `tolerance` in `distance` mode; other modes do not use it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub feature_tolerance: Option<Length>,
+    /// Weight of the sharpest marked edges in the quadrics that place vertices. Default 100.
+    #[schemars(range(min = 0.0))]
+    pub feature_weight: f64,
+    /// Stops when this many faces are left; edges may then grow beyond `max-edge`. Default: goes on until no edge is
+    /// valid.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub target_faces: Option<usize>,
+    /// Refinement that would make more faces than this is refused. Default 20 million.
+    #[schemars(range(min = 4))]
+    pub max_faces: usize,
+    /// Whether flips, splits and relaxation go in between the collapses. Default: in `distance` mode only; `false` is
+    /// the pure collapse of the papers.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub optimize: Option<bool>,
+}
+
+impl Default for ImproveQualityParams {
+    fn default() -> Self {
+        Self {
+            max_edge: None,
+            tolerance: Length::Percent(0.2),
+            tolerance_mode: ToleranceMode::Distance,
+            feature_tolerance: None,
+            feature_weight: 100.0,
+            target_faces: None,
+            max_faces: MAX_FACES,
+            optimize: None,
+        }
+    }
+}
+
+/// What quality improvement did. Shape and size are counted on the result.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub struct ImproveQualityStats {
+    /// Whether the number of faces asked for was reached; `true` where none was asked for.
+    pub target_reached: bool,
+    /// Faces of the input.
+    pub faces_before: usize,
+    /// Faces after refinement.
+    pub faces_refined: usize,
+    /// Faces of the result.
+    pub faces_after: usize,
+    /// Edges collapsed.
+    pub collapses: usize,
+    /// Edges flipped.
+    pub flips: usize,
+    /// Edges split after refinement.
+    pub splits: usize,
+    /// Vertices moved.
+    pub moves: usize,
+    /// Edits refused because the surface would have left the tolerance.
+    pub refused_by_tolerance: usize,
+    /// Edits refused because faces would have intersected.
+    pub refused_by_intersection: usize,
+    /// Least stretch before.
+    pub min_stretch_before: f64,
+    /// Mean stretch before.
+    pub mean_stretch_before: f64,
+    /// Least stretch.
+    pub min_stretch: f64,
+    /// Mean stretch.
+    pub mean_stretch: f64,
+    /// Longest side, in mesh units.
+    pub max_size: f64,
+    /// Most edges at a vertex.
+    pub max_valence: usize,
+    /// The tolerance in mesh units (their square in `quadric-sum` mode).
+    pub tolerance: f64,
+}
+
+/// Why quality improvement refused.
+#[derive(Debug, thiserror::Error)]
+pub enum ImproveQualityError {
+    /// The tolerance has no meaning in this mode.
+    #[error("in `quadric-sum` mode `tolerance` is a squared length: a number, not a percent")]
+    PercentOfSquare,
+    /// A parameter is out of range.
+    #[error("{name} must be {range}, got {value}")]
+    OutOfRange {
+        /// The parameter.
+        name: &'static str,
+        /// What it may be.
+        range: &'static str,
+        /// What it is.
+        value: f64,
+    },
+    /// A size names a field or group that is not there.
+    #[error("max-edge: {0}")]
+    Size(StepFailure),
+    /// Refinement refused.
+    #[error(transparent)]
+    Refine(#[from] RefineError),
+    /// A lock names a group that is not there.
+    #[error(transparent)]
+    Locks(#[from] FreedomError),
+    /// The input is no surface.
+    #[error(transparent)]
+    NotASurface(#[from] EnterError),
+    /// The run was interrupted.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+}
+
+/// What quality improvement works on.
+#[derive(Clone, Copy, Debug)]
+pub struct ImproveQualityInput<'a> {
+    /// The surface to improve.
+    pub surface: &'a Surface,
+    /// What the tolerance is measured against.
+    pub reference: &'a Surface,
+    /// What must stay.
+    pub locks: LockRules<'a>,
+}
+
+/// Improves `input.surface`.
+///
+/// # Errors
+/// [`ImproveQualityError`]: parameters, groups or fields that do not fit the surface, or too fine a `max-edge`.
+pub fn improve_quality(
+    input: ImproveQualityInput<'_>,
+    params: &ImproveQualityParams,
+    watch: &Watch,
+) -> Result<(Surface, ImproveQualityStats), ImproveQualityError> {
+    let scale = diagonal(input.reference);
+    let sizing = params.max_edge.as_ref().map(|size| size.resolve(input.surface, scale)).transpose();
+    let sizing = sizing.map_err(ImproveQualityError::Size)?;
+    let refined = refine_surface(&input, sizing.as_ref(), params.max_faces, watch)?;
+    let surface = refined.as_ref().unwrap_or(input.surface);
+    let freedom = resolve_freedom(surface, &input.locks)?;
+    let setup = setup(&input, params, sizing, scale)?;
+    let (tolerance, limits) = (setup.tolerance, setup.limits.clone());
+    let tree = reference_tree(params.tolerance_mode, input.reference);
+    let mut editor = open(surface, &freedom, input.reference, &tree, setup)?;
+    let ending = run_phases(&mut editor, params, watch)?;
+    let counts = editor.counts();
+    let result = editor.into_mesh().leave().surface;
+    let before = recount(input.surface, &resolve_freedom(input.surface, &input.locks)?, &limits);
+    let after = recount(&result, &resolve_freedom(&result, &input.locks)?, &limits);
+    let stats = ImproveQualityStats {
+        target_reached: params.target_faces.is_none() || ending == Ending::Target,
+        faces_before: input.surface.faces.len(),
+        faces_refined: surface.faces.len(),
+        faces_after: result.faces.len(),
+        collapses: counts.collapses,
+        flips: counts.flips,
+        splits: counts.splits,
+        moves: counts.moves,
+        refused_by_tolerance: counts.beyond_tolerance,
+        refused_by_intersection: counts.collisions,
+        min_stretch_before: before.min_stretch,
+        mean_stretch_before: before.mean_stretch,
+        min_stretch: after.min_stretch,
+        mean_stretch: after.mean_stretch,
+        max_size: after.max_size,
+        max_valence: after.max_valence,
+        tolerance,
+    };
+    Ok((result, stats))
+}
+
+fn run_phases(editor: &mut Editor<'_>, params: &ImproveQualityParams, watch: &Watch) -> Result<Ending, Cancelled> {
+    let is_certified = params.tolerance_mode == ToleranceMode::Distance;
+    let rules = CollapseRules {
+        min_stretch: FLOOR,
+        mean_stretch: 0.0,
+        must_improve: false,
+        order: if is_certified { Order::OnSurface } else { Order::Printed },
+        priority: Priority::QualityGain,
+    };
+    let target = params.target_faces.unwrap_or(0);
+    if params.optimize.unwrap_or(is_certified) {
+        coarsen(editor, &rules, target, watch)
+    } else {
+        simplify(editor, &rules, target, watch)
+    }
+}
+
+/// Selective subdivision; `None` where nothing was asked for.
+fn refine_surface(
+    input: &ImproveQualityInput<'_>,
+    sizing: Option<&ResolvedSizing>,
+    max_faces: usize,
+    watch: &Watch,
+) -> Result<Option<Surface>, RefineError> {
+    let limit = match sizing {
+        None => return Ok(None),
+        Some(ResolvedSizing::Uniform(length)) => MaxEdge::Uniform(*length),
+        Some(ResolvedSizing::Corners(values)) => MaxEdge::Corners(IdVec::from(values.clone())),
+    };
+    let (surface, _) = refine(input.surface, &limit, max_faces, &input.locks, watch)?;
+    Ok(Some(surface))
+}
+
+fn setup(
+    input: &ImproveQualityInput<'_>,
+    params: &ImproveQualityParams,
+    sizing: Option<ResolvedSizing>,
+    diagonal: f64,
+) -> Result<Setup, ImproveQualityError> {
+    let tolerance = match (params.tolerance_mode, params.tolerance) {
+        (ToleranceMode::QuadricSum, Length::Percent(_)) => return Err(ImproveQualityError::PercentOfSquare),
+        (_, length) => length.resolve(diagonal),
+    };
+    let out_of_range = |name, range, value| ImproveQualityError::OutOfRange { name, range, value };
+    if !(params.feature_weight >= 0.0 && params.feature_weight.is_finite()) {
+        return Err(out_of_range("feature-weight", "finite and not negative", params.feature_weight));
+    }
+    if tolerance <= 0.0 && params.tolerance_mode == ToleranceMode::Distance {
+        return Err(out_of_range("tolerance", "above 0", tolerance));
+    }
+    let max_size = match sizing {
+        Some(ResolvedSizing::Uniform(length)) if params.target_faces.is_none() => SizeField::Uniform(length),
+        Some(ResolvedSizing::Corners(values)) if params.target_faces.is_none() => {
+            SizeField::varying(input.surface, values)
+        }
+        None | Some(_) => SizeField::Uniform(f64::INFINITY),
+    };
+    Ok(Setup {
+        mode: params.tolerance_mode,
+        tolerance,
+        feature_tolerance: params.feature_tolerance.map_or(0.5 * tolerance, |length| length.resolve(diagonal)),
+        feature_weight: params.feature_weight,
+        // Quality improvement has no valence limit of its own; this one keeps fans of hundreds of faces away.
+        limits: Limits { min_stretch: FLOOR, max_size, max_valence: 12 },
+    })
+}
+
+impl From<ImproveQualityError> for StepFailure {
+    fn from(error: ImproveQualityError) -> Self {
+        let message = error.to_string();
+        match error {
+            ImproveQualityError::Cancelled(cancelled)
+            | ImproveQualityError::Refine(RefineError::Cancelled(cancelled)) => cancelled.into(),
+            ImproveQualityError::PercentOfSquare => Self::failed(message)
+                .with_help("give a number in squared mesh units, or use `tolerance-mode = \"quadric-rms\"`"),
+            ImproveQualityError::Size(failure) => Self { message, ..failure },
+            ImproveQualityError::NotASurface(_) => Self::bad_input(message).with_help("run `repair` first"),
+            ImproveQualityError::Refine(_) => Self::failed(message).with_help("give a larger `max-edge`"),
+            ImproveQualityError::OutOfRange { .. } | ImproveQualityError::Locks(_) => Self::failed(message),
+        }
+    }
+}
+
+/// The room's entry in the catalog.
+pub struct Step;
+
+impl crate::step::Step for Step {
+    const NAME: &'static str = "improve-quality";
+    const REVISION: u32 = 1;
+    const INPUTS: &'static [InputDef] = &[
+        InputDef { name: "from", accepts: &[Port::Surface], required: true, doc: "the surface to improve" },
+        InputDef {
+            name: "reference",
+            accepts: &[Port::Surface],
+            required: false,
+            doc: "what the tolerance is measured against; default: `from`",
+        },
+    ];
+    const OUTPUTS: &'static [OutputDef] = &[OutputDef { name: "main", port: OutPort::Is(Port::Surface) }];
+    const EDITS: bool = true;
+    const CARRIES: &'static str = "Maps groups, regions, marks, pins and seams; drops fields.";
+    const EXAMPLE: &'static str =
+        "use = \"improve-quality\"\nfrom = \"clean\"\nmax-edge = \"2%\"\ntolerance = \"0.2%\"\n";
+
+    type Params = ImproveQualityParams;
+    type Stats = ImproveQualityStats;
+
+    fn run(
+        inputs: &Inputs,
+        _output: &str,
+        params: &ImproveQualityParams,
+        locks: &Locks,
+        watch: &Watch,
+    ) -> Result<Produced<ImproveQualityStats>, StepFailure> {
+        let surface = inputs.surface("from")?;
+        let reference = inputs.surface_opt("reference")?.unwrap_or(surface);
+        let input = ImproveQualityInput { surface, reference, locks: locks.rules() };
+        let (surface, stats) = improve_quality(input, params, watch)?;
+        Ok(Produced { artifact: Artifact::Surface(Arc::new(surface)), stats })
+    }
+}
