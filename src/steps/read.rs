@@ -67,6 +67,10 @@ pub struct ReadStats {
     pub fields_dropped: usize,
     /// Repeated corners merged into a vertex with identical coordinates.
     pub corners_welded: usize,
+    /// Nodes that only mid-side positions or left-out elements used, left out.
+    pub nodes_dropped: usize,
+    /// Volumes and other elements that are no faces, left out.
+    pub elements_dropped: usize,
 }
 
 /// Why a file was refused.
@@ -147,6 +151,8 @@ fn stats(format: Format, soup: &Soup, counts: ReadCounts) -> ReadStats {
         faces_dropped: counts.faces_dropped,
         fields_dropped: counts.fields_dropped,
         corners_welded: counts.corners_welded,
+        nodes_dropped: counts.nodes_dropped,
+        elements_dropped: counts.elements_dropped,
     }
 }
 
@@ -207,5 +213,57 @@ impl StepContract for Step {
         };
         let (soup, stats) = read(file, params, watch)?;
         Ok(Produced { artifact: Artifact::Soup(Arc::new(soup)), stats })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::step::FailureKind;
+
+    const TRIANGLE: &str = "g Top\nv 0 0 0\nv 2 0 0\nv 0 2 0\nf 1 2 3\n";
+
+    fn file(name: &str, text: &str) -> FileBytes {
+        FileBytes { name: name.into(), bytes: text.as_bytes().to_vec() }
+    }
+
+    fn run(name: &str, text: &str, params: &ReadParams) -> Result<Produced<ReadStats>, StepFailure> {
+        let inputs = Inputs::new(vec![("file", Artifact::File(Arc::new(file(name, text))))]);
+        Step::run(&inputs, "main", params, &Locks::default(), &Watch::silent())
+    }
+
+    #[test]
+    fn scale_multiplies_every_coordinate_and_stats_say_what_was_read() {
+        let params = ReadParams { scale: 25.4, ..ReadParams::default() };
+        let (soup, stats) = read(&file("part.OBJ", TRIANGLE), &params, &Watch::silent()).expect("a triangle");
+        assert_eq!(soup.points.as_slice()[1].to_array(), [50.8, 0.0, 0.0]);
+        assert_eq!((stats.format, stats.points, stats.triangles, stats.groups), (Format::Obj, 3, 1, 1));
+    }
+
+    #[test]
+    fn the_format_parameter_overrides_the_ending() {
+        let params = ReadParams { format: Some(Format::Obj), ..ReadParams::default() };
+        assert!(run("part.stl", TRIANGLE, &params).is_ok());
+        let failure = run("part.stl", TRIANGLE, &ReadParams::default()).expect_err("no STL");
+        assert_eq!(failure.help.as_deref(), Some("the content looks like OBJ: read it as `obj`"));
+    }
+
+    #[test]
+    fn a_damaged_file_is_bad_input_with_its_line() {
+        let failure = run("part.obj", "v 0 0 0\nv 1 x 0\n", &ReadParams::default()).expect_err("a wrong number");
+        assert_eq!(failure.kind, FailureKind::BadInput);
+        assert_eq!(failure.message, "part.obj: OBJ, line 2: expected a coordinate, found \"x\"");
+        assert_eq!(failure.elements, [ElementRef { kind: "line".into(), id: 2, at: None }]);
+    }
+
+    #[test]
+    fn a_scale_that_is_no_size_is_refused() {
+        for scale in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            let params = ReadParams { scale, ..ReadParams::default() };
+            assert_eq!(run("part.obj", TRIANGLE, &params).map(|_| ()).map_err(|f| f.kind), Err(FailureKind::BadInput));
+        }
+        let params = ReadParams { scale: 1e300, ..ReadParams::default() };
+        let far = file("part.obj", &TRIANGLE.replace("v 2", "v 2e10"));
+        assert_eq!(read(&far, &params, &Watch::silent()), Err(ReadError::ScaledTooFar { vertex: 1, scale: 1e300 }));
     }
 }
