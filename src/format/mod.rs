@@ -4,6 +4,7 @@
 //! file makes a reader allocate more than the file could hold. A format is one entry here and one file: a variant of
 //! [`Format`], an arm in [`Format::def`], a [`FormatDef`] beside its reader and writer.
 
+mod bdf;
 mod binary;
 mod builder;
 mod element;
@@ -51,6 +52,8 @@ pub enum Format {
     Msh,
     /// Gmsh 2.2.
     Msh22,
+    /// Nastran bulk data.
+    Bdf,
 }
 
 /// What a format is and does; one beside each reader and writer.
@@ -140,7 +143,7 @@ impl std::fmt::Debug for WriteOptions<'_> {
 impl Format {
     /// All formats.
     pub const ALL: &'static [Self] =
-        &[Self::Stl, Self::Obj, Self::Ply, Self::Off, Self::Vtu, Self::Inp, Self::Msh, Self::Msh22];
+        &[Self::Stl, Self::Obj, Self::Ply, Self::Off, Self::Vtu, Self::Inp, Self::Msh, Self::Msh22, Self::Bdf];
 
     fn def(self) -> &'static FormatDef {
         match self {
@@ -152,6 +155,7 @@ impl Format {
             Self::Inp => &inp::DEF,
             Self::Msh => &msh::DEF,
             Self::Msh22 => &msh::DEF_22,
+            Self::Bdf => &bdf::DEF,
         }
     }
 

@@ -21,6 +21,26 @@ pub(super) fn face_sets(soup: &Soup) -> BTreeMap<String, Vec<FaceId>> {
     sets
 }
 
+/// Faces by the first group that holds them, in name order, then the faces in no group; regions count as groups.
+pub(super) fn partition(soup: &Soup) -> Vec<(String, Vec<FaceId>)> {
+    let mut taken = vec![false; soup.faces.len()];
+    let mut parts = Vec::new();
+    for (name, members) in face_sets(soup) {
+        let own: Vec<FaceId> = members
+            .into_iter()
+            .filter(|f| taken.get_mut(f.index()).is_some_and(|t| !std::mem::replace(t, true)))
+            .collect();
+        if !own.is_empty() {
+            parts.push((name, own));
+        }
+    }
+    let rest: Vec<FaceId> = soup.faces.ids().filter(|f| !taken[f.index()]).collect();
+    if !rest.is_empty() || parts.is_empty() {
+        parts.push((String::new(), rest));
+    }
+    parts
+}
+
 /// The mesh with all vertices of one seam id merged into the first of them: what writers write, so that shells which
 /// meet in a T-joint are connected again. Borrowed when there is no seam.
 pub fn welded_seams(soup: &Soup) -> Cow<'_, Soup> {

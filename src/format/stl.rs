@@ -17,7 +17,7 @@ use glam::DVec3;
 
 use super::binary::{ByteOrder, ByteReader, finite};
 use super::error::{FormatError, Place, Reason};
-use super::sets::face_sets;
+use super::sets::partition;
 use super::text::{Scanner, push_number};
 use super::weld::Welder;
 use super::{FormatDef, ReadCounts, ReadResult, WriteOptions};
@@ -285,7 +285,7 @@ fn single(number: f64) -> Result<f32, FormatError> {
 
 fn write_text(soup: &Soup, options: &WriteOptions<'_>) -> Vec<u8> {
     let mut out = Vec::with_capacity(250 * soup.faces.len() + 64);
-    for (name, faces) in solids_of(soup) {
+    for (name, faces) in partition(soup) {
         push_solid_line(&mut out, "solid", &name);
         for face in faces {
             for triangle in triangles(soup, soup.faces[face]) {
@@ -295,26 +295,6 @@ fn write_text(soup: &Soup, options: &WriteOptions<'_>) -> Vec<u8> {
         push_solid_line(&mut out, "endsolid", &name);
     }
     out
-}
-
-/// Faces by the first group that holds them, in name order, then the faces in no group; regions where no groups are.
-fn solids_of(soup: &Soup) -> Vec<(String, Vec<FaceId>)> {
-    let mut taken = vec![false; soup.faces.len()];
-    let mut solids = Vec::new();
-    for (name, members) in face_sets(soup) {
-        let own: Vec<FaceId> = members
-            .into_iter()
-            .filter(|f| taken.get_mut(f.index()).is_some_and(|t| !std::mem::replace(t, true)))
-            .collect();
-        if !own.is_empty() {
-            solids.push((name, own));
-        }
-    }
-    let rest: Vec<FaceId> = soup.faces.ids().filter(|f| !taken[f.index()]).collect();
-    if !rest.is_empty() || solids.is_empty() {
-        solids.push((String::new(), rest));
-    }
-    solids
 }
 
 fn push_solid_line(out: &mut Vec<u8>, keyword: &str, name: &str) {

@@ -90,6 +90,18 @@ impl<'a> Scanner<'a> {
         self.bytes[start..self.at].trim_ascii()
     }
 
+    /// The rest of this line as it stands, for formats where columns count.
+    pub(super) fn raw_rest_of_line(&mut self) -> &'a [u8] {
+        let start = self.at;
+        self.rest_of_line();
+        &self.bytes[start..self.at]
+    }
+
+    /// Whether nothing is left.
+    pub(super) fn is_at_end(&self) -> bool {
+        self.at == self.bytes.len()
+    }
+
     /// Goes to the next line; `false` when there is none.
     #[inline]
     pub(super) fn next_line(&mut self) -> bool {

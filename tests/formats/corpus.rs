@@ -79,6 +79,19 @@ fn ply_elements_in_any_order_with_fields() {
 }
 
 #[test]
+fn bulk_data_in_short_long_and_free_fields() {
+    let (soup, counts) = load("mixed_fields.bdf");
+    let points: Vec<[f64; 3]> = soup.points.iter().map(|p| p.to_array()).collect();
+    assert_eq!(points, [[0.0; 3], [1.5, 0.0, 0.0], [1.5, 2e-3, 0.0], [0.0, 2.0, -0.25], [9.0, 9.0, 9.0]]);
+    assert_eq!((counts.nodes_dropped, counts.elements_dropped), (1, 1));
+    assert_eq!(corners(&soup, 0), [0, 1, 2]);
+    assert_eq!(corners(&soup, 1), [0, 1, 2, 3]);
+    assert_eq!(corners(&soup, 2), [0, 2, 3]);
+    assert_eq!((faces(&soup, "Inlet pipe"), faces(&soup, "pid_20")), (vec![0, 2], vec![1]));
+    assert_eq!(soup.carried.groups.edges["pid_30"].len(), 1);
+}
+
+#[test]
 fn text_in_old_line_ends_and_with_a_byte_order_mark() {
     let obj = b"\xef\xbb\xbfv 0 0 0\rv 1 0 0\rv 0 1 0\rf 1 2 3\r";
     assert_eq!(parse("old.obj", obj).0.faces.as_slice(), [Facet::Tri([0, 1, 2].map(VertexId::from_raw))]);
@@ -123,6 +136,7 @@ fn the_content_tells_the_format_without_an_ending() {
         "relative_continued_groups.obj",
         "coloured_one_line.off",
         "faces_first_extra.ply",
+        "mixed_fields.bdf",
     ] {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/corpus").join(name);
         let bytes = std::fs::read(path).expect("the corpus is part of the project");

@@ -98,6 +98,23 @@ proptest! {
     }
 
     #[test]
+    fn bulk_data_keeps_faces_and_a_partition_into_groups(soup in any_soup(), cut in any::<usize>()) {
+        let mut soup = soup;
+        // A coordinate has 16 characters; a quad with a repeated corner is a triangle there.
+        for point in soup.points.iter_mut() {
+            *point = DVec3::from_array(point.to_array().map(|x| f64::from(x as f32 as i16) / 64.0));
+        }
+        soup.faces = soup.faces.iter().filter(|f| matches!(f, Facet::Tri(_))).copied().collect();
+        prop_assume!(!soup.faces.is_empty());
+        let cut = cut % (soup.faces.len() + 1);
+        let inlet: Vec<FaceId> = (0..cut).map(FaceId::new).collect();
+        if !inlet.is_empty() {
+            soup.carried.groups.faces.insert("Inlet \u{e9} 1".into(), inlet);
+        }
+        prop_assert_eq!(again(Format::Bdf, &soup, &WriteOptions::default()), soup);
+    }
+
+    #[test]
     fn text_stl_keeps_triangles_exactly(mut soup in any_soup()) {
         soup.faces = soup.faces.iter().filter(|f| matches!(f, Facet::Tri(_))).copied().collect();
         prop_assume!(!soup.faces.is_empty());
