@@ -1,9 +1,11 @@
 //! The catalog: every step that a recipe can use, one file and one line each.
 
 pub mod control_properties;
+pub mod features;
 pub mod improve_quality;
 pub mod measure;
 pub mod read;
+pub mod refine;
 pub mod repair;
 pub mod subdivide;
 
@@ -13,7 +15,9 @@ use crate::step::StepDef;
 pub static CATALOG: &[StepDef] = &[
     StepDef::of::<read::Step>(),
     StepDef::of::<repair::Step>(),
+    StepDef::of::<features::Step>(),
     StepDef::of::<subdivide::Step>(),
+    StepDef::of::<refine::Step>(),
     StepDef::of::<improve_quality::Step>(),
     StepDef::of::<control_properties::Step>(),
     StepDef::of::<measure::Step>(),

@@ -3,6 +3,7 @@
 pub mod collapse;
 pub mod curvature;
 pub mod eigen;
+pub mod feature;
 pub mod halve_edges;
 pub mod heap;
 pub mod hierarchy;

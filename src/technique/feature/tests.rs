@@ -1,0 +1,81 @@
+//! Known answers: cube, cylinders, sphere, flat grid.
+
+use super::*;
+use crate::mesh::halfedge::tests::surface;
+use crate::mesh::{MarkCause, Regions};
+
+const RULES: FeatureRules = FeatureRules { angle: 30.0, seed_angle: 40.0, corner_angle: 45.0, region_borders: true };
+
+fn cube() -> Surface {
+    let points: Vec<[f64; 3]> =
+        (0..8_u8).map(|k| [f64::from(k & 1), f64::from(k >> 1 & 1), f64::from(k >> 2)]).collect();
+    let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    let faces: Vec<[u32; 3]> = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+    surface(&points, &faces)
+}
+
+/// A closed cylinder of `n` facets with caps fanned from their centres.
+fn cylinder(n: u32) -> Surface {
+    let at = |k: u32, z: f64| {
+        let (sin, cos) = libm::sincos(std::f64::consts::TAU * f64::from(k) / f64::from(n));
+        [cos, sin, z]
+    };
+    let mut points: Vec<[f64; 3]> = (0..n).map(|k| at(k, 0.0)).chain((0..n).map(|k| at(k, 3.0))).collect();
+    points.extend([[0.0; 3], [0.0, 0.0, 3.0]]);
+    let mut faces = Vec::new();
+    for k in 0..n {
+        let next = (k + 1) % n;
+        faces.extend([[k, next, n + next], [k, n + next, n + k], [2 * n, next, k], [2 * n + 1, n + k, n + next]]);
+    }
+    surface(&points, &faces)
+}
+
+#[test]
+fn a_cube_has_twelve_edges_and_eight_corners() {
+    let (marked, report) = mark_features(&cube(), &RULES);
+    assert_eq!((report.sharp_edges, report.curves, report.corners), (12, 12, 8));
+    assert_eq!(report.length, 12.0);
+    assert_eq!((marked.carried.marks.len(), marked.carried.pins.len()), (12, 8));
+    assert_eq!(report.facet_angle, None);
+}
+
+#[test]
+fn a_second_run_changes_nothing() {
+    for mesh in [cube(), cylinder(16), cylinder(10)] {
+        let (once, first) = mark_features(&mesh, &RULES);
+        let (twice, second) = mark_features(&once, &RULES);
+        assert_eq!((&once, &first), (&twice, &second));
+    }
+}
+
+#[test]
+fn a_cylinder_has_two_rims_only() {
+    for n in [16, 32, 64, 256] {
+        let (_, report) = mark_features(&cylinder(n), &RULES);
+        assert_eq!((report.sharp_edges, report.curves, report.corners), (2 * n as usize, 2, 0), "n = {n}");
+    }
+    let (_, report) = mark_features(&cylinder(16), &RULES);
+    assert_eq!(report.facet_angle, Some(22.5));
+}
+
+#[test]
+fn rims_and_region_borders_are_curves() {
+    let points = [[0.0; 3], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
+    let mut square = surface(&points, &[[0, 1, 2], [0, 2, 3]]);
+    square.carried.regions = Some(Regions { labels: vec![0, 1].into(), names: vec!["a".into(), "b".into()] });
+    let (marked, report) = mark_features(&square, &RULES);
+    assert_eq!((report.rim_edges, report.border_edges, report.sharp_edges, report.corners), (4, 1, 0, 4));
+    let diagonal = marked.carried.marks[&[VertexId::new(0), VertexId::new(2)]];
+    assert_eq!((diagonal.cause, diagonal.freedom), (MarkCause::RegionBorder, Freedom::OnCurve));
+    let (_, report) = mark_features(&square, &FeatureRules { region_borders: false, ..RULES });
+    assert_eq!((report.border_edges, report.curves), (0, 4));
+}
+
+#[test]
+fn a_short_loose_chain_is_dropped() {
+    // A square with one slightly lifted vertex near its middle: four weak creases, all below the seed angle.
+    let points = [[0.0; 3], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0], [0.5, 0.5, 0.22]];
+    let mesh = surface(&points, &[[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]]);
+    let (_, report) = mark_features(&mesh, &RULES);
+    assert_eq!((report.sharp_edges, report.rim_edges), (0, 4));
+}
