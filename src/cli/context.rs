@@ -61,10 +61,9 @@ impl Planned {
     }
 }
 
-/// The endings of files that can be written: meshes, and tables of metrics.
+/// The endings of files that can be written.
 fn endings() -> Vec<&'static str> {
-    let meshes = Format::ALL.iter().flat_map(|format| format.endings()).copied();
-    meshes.chain(["json", "ron"]).collect()
+    Format::ALL.iter().flat_map(|format| format.endings()).copied().collect()
 }
 
 fn check_file(path: &Path) -> Result<(), String> {

@@ -10,6 +10,7 @@ mod context;
 mod convert;
 mod exit;
 mod graph;
+mod measure;
 mod plan;
 mod progress;
 mod run;
@@ -63,6 +64,7 @@ enum Command {
     Check(check::Arguments),
     Plan(plan::Arguments),
     Graph(graph::Arguments),
+    Measure(measure::Arguments),
     Convert(convert::Arguments),
     Steps(steps::Arguments),
     Cache(cache::Arguments),
@@ -87,6 +89,7 @@ pub fn main() -> ExitCode {
         Command::Check(command) => check::run(command),
         Command::Plan(command) => plan::run(command, global),
         Command::Graph(command) => graph::run(command),
+        Command::Measure(command) => measure::run(command),
         Command::Convert(command) => convert::run(command),
         Command::Steps(command) => steps::run(command),
         Command::Cache(command) => cache::run(command, global),

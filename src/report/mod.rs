@@ -13,10 +13,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::metric::Measurement;
 use crate::metric::gate::GateRow;
-use crate::plan::{Plan, Task, TaskId};
-use crate::run::{FileState, RunOutcome, TaskOutcome, TaskState, VERSION};
+use crate::run::{Figures, FileState, Gate, Outcome, Plan, RunOutcome, Task, TaskId, TaskOutcome, TaskState, VERSION};
 use crate::step::StepFailure;
-use crate::store::{Figures, Outcome};
 
 /// How a run ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -210,7 +208,7 @@ impl CaseReport {
     }
 }
 
-fn gate_section(gate: &crate::plan::Gate, outcome: &RunOutcome) -> GateSection {
+fn gate_section(gate: &Gate, outcome: &RunOutcome) -> GateSection {
     let mut section =
         GateSection { step: gate.step.clone(), passed: Some(true), rows: Vec::new(), failures: Vec::new() };
     for task in gate.tasks.iter().map(|task| outcome.task(*task)) {

@@ -7,8 +7,7 @@ use comfy_table::{CellAlignment, Table};
 use super::measure::{number_text, rows, value_text};
 use super::{CaseReport, Report};
 use crate::metric::Measurement;
-use crate::run::TaskState;
-use crate::store::Figures;
+use crate::run::{Figures, FileState, TaskState};
 
 /// The whole report: steps, metrics, gates and files of every case.
 pub fn report(report: &Report) -> String {
@@ -89,9 +88,9 @@ fn files(case: &CaseReport, report: &Report) -> String {
     let mut table = plain(&["file", "of", "state"]);
     for file in &case.files {
         let state = match (report.timings.files.get(&file.path), file.failed_gate) {
-            (Some(crate::run::FileState::Current), _) => "up to date",
-            (Some(crate::run::FileState::Written), _) => "written",
-            (Some(crate::run::FileState::Missing) | None, _) => "not written",
+            (Some(FileState::Current), _) => "up to date",
+            (Some(FileState::Written), _) => "written",
+            (Some(FileState::Missing) | None, _) => "not written",
         };
         table.add_row([file.path.as_str(), file.step.as_str(), state]);
     }

@@ -1,22 +1,41 @@
 //! The few numbers of an artifact that tables and progress lines show, taken once when it is made.
 
+use crate::mesh::{Facet, Soup, Surface, geometry};
+use crate::metric::summary;
 use crate::step::Artifact;
 use crate::store::Figures;
 
 /// The figures of an artifact.
 pub(super) fn figures(artifact: &Artifact) -> Figures {
-    let mut figures = Figures { port: artifact.port().to_string(), ..Figures::default() };
+    let port = artifact.port().to_string();
     match artifact {
-        Artifact::File(_) => {}
-        Artifact::Soup(soup) => {
-            figures.vertices = Some(soup.points.len() as u64);
-            figures.faces = Some(soup.faces.len() as u64);
-        }
+        Artifact::File(_) => Figures { port, ..Figures::default() },
+        Artifact::Soup(soup) => Figures { port, ..of_mesh(soup.points.len(), soup.faces.len(), &stretches(soup)) },
         Artifact::Surface(surface) => {
-            figures.vertices = Some(surface.points.len() as u64);
-            figures.faces = Some(surface.faces.len() as u64);
+            Figures { port, ..of_mesh(surface.points.len(), surface.faces.len(), &surface_stretches(surface)) }
         }
-        Artifact::Metrics(metrics) => figures.metrics = Some((**metrics).clone()),
+        Artifact::Metrics(metrics) => Figures { port, metrics: Some((**metrics).clone()), ..Figures::default() },
     }
-    figures
+}
+
+fn of_mesh(vertices: usize, faces: usize, stretches: &[f64]) -> Figures {
+    Figures {
+        vertices: Some(vertices as u64),
+        faces: Some(faces as u64),
+        min_stretch: summary::min(stretches),
+        mean_stretch: summary::mean(stretches),
+        ..Figures::default()
+    }
+}
+
+fn stretches(soup: &Soup) -> Vec<f64> {
+    let stretch = |facet: &Facet| match facet {
+        Facet::Tri(corners) => Some(geometry::stretch(corners.map(|v| soup.points[v]))),
+        Facet::Quad(_) => None,
+    };
+    soup.faces.iter().filter_map(stretch).collect()
+}
+
+fn surface_stretches(surface: &Surface) -> Vec<f64> {
+    surface.faces.ids().map(|face| geometry::stretch(surface.corners(face))).collect()
 }

@@ -41,8 +41,9 @@ pub use preview::{Forecast, preview};
 pub use schedule::run;
 pub use shared::{VERSION, recipe_task};
 
-use crate::plan::{Plan, Task};
-use crate::store::StoreError;
+// An outcome speaks of these, so whoever reads outcomes finds them here.
+pub use crate::plan::{Gate, Plan, Task, TaskId};
+pub use crate::store::{Entry, Figures, Outcome, StoreError};
 
 /// What the caller decides about a run.
 #[derive(Clone, Debug)]

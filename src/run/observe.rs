@@ -2,6 +2,7 @@
 
 use super::board::TaskState;
 use crate::store::Entry;
+use crate::watch::Progress;
 
 /// Something happened.
 #[derive(Clone, Copy, Debug)]
@@ -49,4 +50,9 @@ pub struct Silent;
 
 impl Observer for Silent {
     fn event(&self, _event: &Event<'_>) {}
+}
+
+impl Progress for Silent {
+    fn phase(&self, _name: &str, _total: Option<u64>) {}
+    fn advance(&self, _done: u64, _figure: &str) {}
 }

@@ -168,9 +168,6 @@ fn encode(
     content: ContentHash,
 ) -> Result<Vec<u8>, StepFailure> {
     let name = file.file_name().unwrap_or_default().to_string_lossy();
-    if let Artifact::Metrics(metrics) = artifact {
-        return encode_metrics(metrics, &name);
-    }
     let format = Format::from_file_name(&name).ok_or_else(|| unknown_ending(&name))?;
     let soup = artifact.to_soup().ok_or_else(|| StepFailure::failed(format!("a {} is not a mesh", artifact.port())))?;
     let element = options.element.as_deref().map(element).transpose()?;
@@ -195,18 +192,6 @@ fn encode(
 fn element(name: &str) -> Result<Element, StepFailure> {
     serde_json::from_value(serde_json::Value::from(name))
         .map_err(|_| StepFailure::failed(format!("unknown element `{name}`")).with_help("use S3, S4, S6 or S8R"))
-}
-
-fn encode_metrics(metrics: &crate::metric::Measurement, name: &str) -> Result<Vec<u8>, StepFailure> {
-    let ending = name.rsplit_once('.').map_or("", |(_, ending)| ending).to_ascii_lowercase();
-    let text = match ending.as_str() {
-        "json" => serde_json::to_string_pretty(metrics).map_err(|error| error.to_string()),
-        "ron" => {
-            ron::ser::to_string_pretty(metrics, ron::ser::PrettyConfig::default()).map_err(|error| error.to_string())
-        }
-        _ => return Err(unknown_ending(name).with_help("a table of metrics is written as .json or .ron")),
-    };
-    text.map(|text| (text + "\n").into_bytes()).map_err(StepFailure::failed)
 }
 
 fn unknown_ending(name: &str) -> StepFailure {

@@ -15,6 +15,14 @@ const STALE: Duration = Duration::from_hours(24);
 /// Writes a file so that readers see the old content or all of the new one.
 pub(super) fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    match write_in(folder, path, bytes) {
+        // Another run may have removed the folder while it was empty.
+        Err(error) if error.kind() == io::ErrorKind::NotFound => write_in(folder, path, bytes),
+        result => result,
+    }
+}
+
+fn write_in(folder: &Path, path: &Path, bytes: &[u8]) -> io::Result<()> {
     fs::create_dir_all(folder)?;
     let prefix = format!("{PREFIX}{}-{}-", host(), std::process::id());
     let mut builder = tempfile::Builder::new();
