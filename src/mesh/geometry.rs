@@ -154,7 +154,8 @@ pub fn aspect_ratio(corners: [DVec3; 3]) -> f64 {
 /// The angle between two vectors in radians, from 0 to π; 0 where one is zero.
 #[inline]
 pub fn angle(u: DVec3, v: DVec3) -> f64 {
-    libm::atan2(u.cross(v).length(), u.dot(v))
+    // Adding zero turns a negative zero, as of a side without length, into zero.
+    libm::atan2(u.cross(v).length(), u.dot(v) + 0.0)
 }
 
 /// The angles at the three corners in radians.

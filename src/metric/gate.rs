@@ -110,3 +110,6 @@ impl GateReport {
 
 /// How many faults a row lists.
 pub const MAX_FAULTS: usize = 1000;
+
+#[cfg(test)]
+mod tests;

@@ -10,6 +10,8 @@ use crate::mesh::geometry::{area_vector, closest_on_triangle, triangle_size};
 pub(super) struct Limits {
     /// A piece with a bound of at most this is not cut.
     accept: f64,
+    /// Nor one with a bound that exceeds what the face reaches by at most this.
+    slack: f64,
     /// A face that reaches more than this is settled.
     give_up: f64,
     /// Pieces a face.
@@ -24,9 +26,9 @@ const FEWEST: usize = 256;
 const MOST: usize = 200_000;
 
 impl Limits {
-    pub(super) fn new(accept: f64, give_up: f64, faces: usize, to: &Target) -> Self {
+    pub(super) fn new(accept: f64, slack: f64, give_up: f64, faces: usize, to: &Target) -> Self {
         let pieces = (ALL_PIECES / faces.max(1)).clamp(FEWEST, MOST);
-        Self { accept, give_up, pieces, radius: 1e-10 * to.bvh.bounds().diagonal() }
+        Self { accept, slack, give_up, pieces, radius: 1e-10 * to.bvh.bounds().diagonal() }
     }
 }
 
@@ -95,7 +97,8 @@ pub(super) fn refine(corners: [(DVec3, (f64, u32)); 3], to: &Target, limits: &Li
         }
         seen += 1;
         let by_corners = bound_by_corners(&piece, to);
-        if by_corners <= limits.accept {
+        let accept = limits.accept.max(bound.lower + limits.slack);
+        if by_corners <= accept {
             bound.upper = bound.upper.max(by_corners);
             continue;
         }
@@ -104,11 +107,11 @@ pub(super) fn refine(corners: [(DVec3, (f64, u32)); 3], to: &Target, limits: &Li
         let Some(found) = to.bvh.closest(centre) else { break };
         bound.reach(found.distance(), centre);
         let best = by_corners.min(found.distance() + radius).min(to_triangle(&piece, to, found.index));
-        if best <= limits.accept || radius <= limits.radius || seen >= limits.pieces {
+        if best <= accept || radius <= limits.radius || seen >= limits.pieces {
             bound.upper = bound.upper.max(best);
             continue;
         }
-        for part in cut(&piece, centre, radius, found.index, to, limits) {
+        for part in cut(&piece, (centre, radius), found.index, to, accept) {
             for c in &part {
                 bound.reach(c.distance_squared.sqrt(), c.point);
             }
@@ -121,19 +124,18 @@ pub(super) fn refine(corners: [(DVec3, (f64, u32)); 3], to: &Target, limits: &Li
 
 /// Cuts a piece along the sides of the prism over triangle `t`, where that separates what `t` bounds from what it does
 /// not; else in halves.
-fn cut(piece: &Piece, centre: DVec3, radius: f64, t: u32, to: &Target, limits: &Limits) -> SmallVec<[Piece; 4]> {
+fn cut(piece: &Piece, (centre, radius): (DVec3, f64), t: u32, to: &Target, accept: f64) -> SmallVec<[Piece; 4]> {
     let triangle = to.triangles[t as usize];
     let normal = area_vector(triangle);
-    let far = piece
-        .iter()
-        .copied()
-        .filter(|c| closest_on_triangle(c.point, triangle).distance_squared > limits.accept * limits.accept);
+    let far =
+        piece.iter().copied().filter(|c| closest_on_triangle(c.point, triangle).distance_squared > accept * accept);
     let far: Piece = far.collect();
     let mut planes: SmallVec<[(DVec3, DVec3); 3]> = SmallVec::new();
     for i in 0..3 {
         let (a, b) = (triangle[i], triangle[(i + 1) % 3]);
         let outward = (b - a).cross(normal).normalize_or_zero();
-        if far.iter().any(|c| (c.point - a).dot(outward) > 0.0) {
+        // What lies beyond by rounding only would be cut off again and again.
+        if far.iter().any(|c| (c.point - a).dot(outward) > 1e-9 * radius) {
             planes.push((a, outward));
         }
     }
