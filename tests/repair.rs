@@ -256,3 +256,160 @@ fn outline_of_a_plate_stays_open() {
     let (surface, stats) = run_with(&plate, &fill_all());
     assert_eq!((surface.faces.len(), stats.holes_filled), (2, 0));
 }
+
+#[test]
+fn bodies_that_run_through_each_other_are_reported() {
+    let (surface, stats) = run(&merged(cube([0.0; 3]), &cube([0.5, 0.4, 0.3])));
+    assert_eq!((stats.components, stats.cavities, euler(&surface)), (2, 0, (4, 0)));
+    assert!(stats.self_intersections > 0 && stats.self_intersections == stats.self_intersections_before);
+    assert!(!stats.self_intersecting_faces.is_empty());
+    assert_eq!(run(&cube([0.0; 3])).1.self_intersections, 0);
+    assert_eq!(run(&sphere(16, 0, 16)).1.self_intersections, 0);
+}
+
+/// Three plates of two squares each that meet along the y axis.
+fn t_joint() -> Soup {
+    let mut points = Vec::new();
+    for end in [[-1.0, 0.0], [1.0, 0.0], [0.0, 1.0]] {
+        for y in [0.0, 1.0] {
+            let [a, b, c, d] =
+                [[0.0, y], [0.0, y + 1.0], [1.0, y + 1.0], [1.0, y]].map(|[s, y]| [s * end[0], y, s * end[1]]);
+            points.extend([a, b, c, a, c, d]);
+        }
+    }
+    let faces: Vec<[u32; 3]> = (0..points.len() as u32 / 3).map(|f| [3 * f, 3 * f + 1, 3 * f + 2]).collect();
+    soup(&points, &faces)
+}
+
+#[test]
+fn joint_of_three_plates_keeps_its_seam() {
+    use meshmill::mesh::{Freedom, MarkCause};
+    use meshmill::steps::repair::NonManifold;
+    let params = RepairParams { non_manifold: NonManifold::Seam, ..RepairParams::default() };
+    let (surface, stats) = run_with(&t_joint(), &params);
+    // The straight plates stay one sheet; the third has its own copy of the three vertices of the joint.
+    assert_eq!((stats.components, surface.points.len(), stats.non_manifold_edges_cut), (2, 15, 2));
+    assert_eq!(surface.carried.seams.len(), 6);
+    let seam_edges: Vec<_> = surface.carried.marks.values().collect();
+    assert_eq!(seam_edges.len(), 4);
+    assert!(seam_edges.iter().all(|m| m.freedom == Freedom::Keep && m.cause == MarkCause::Seam));
+    let written = meshmill::format::welded_seams(&surface.to_soup()).into_owned();
+    assert_eq!((written.points.len(), written.faces.len()), (12, 12));
+    let (cut, _) = run(&t_joint());
+    assert!(cut.carried.seams.is_empty() && cut.points.len() == 15);
+}
+
+#[test]
+fn groups_regions_and_fields_follow() {
+    use meshmill::mesh::{FaceId, Field, Regions, Support, edge_key};
+    let mut input = cube([0.0; 3]);
+    input.faces.push(Facet::Tri([0, 1, 1].map(VertexId::from_raw)));
+    let count = input.faces.len();
+    let carried = &mut input.carried;
+    carried.groups.faces.insert("Top".into(), vec![FaceId::new(2), FaceId::new(3)]);
+    carried.groups.vertices.insert("corner".into(), vec![VertexId::from_raw(0)]);
+    carried.groups.edges.insert("edge".into(), vec![edge_key(VertexId::from_raw(0), VertexId::from_raw(1))]);
+    carried.regions = Some(Regions {
+        labels: (0..count as u32).map(|f| f / 2 % 6).collect(),
+        names: (0..6).map(|r| r.to_string()).collect(),
+    });
+    let values = |n: usize| (0..n).map(|i| i as f64).collect::<Vec<f64>>();
+    let (vertices, faces) = (values(input.points.len()), values(count));
+    carried.set_field(Field { name: "u".into(), support: Support::Vertex, components: 1, values: vertices });
+    carried.set_field(Field { name: "w".into(), support: Support::Face, components: 1, values: faces });
+    let (surface, _) = run(&input);
+    let carried = &surface.carried;
+    assert_eq!(carried.groups.faces["Top"], [FaceId::new(2), FaceId::new(3)]);
+    assert_eq!((carried.groups.vertices["corner"].len(), carried.groups.edges["edge"].len()), (1, 1));
+    assert_eq!(carried.regions.as_ref().map(|r| r.labels.len()), Some(12));
+    assert_eq!(carried.field(Support::Face, "w").map(|f| f.values.len()), Some(12));
+    assert_eq!(carried.field(Support::Vertex, "u").map(|f| f.values[0]), Some(0.0));
+}
+
+/// Two cubes on one edge, one of them with a turned, a repeated and a split face.
+fn broken_cubes() -> Soup {
+    let mut input = merged(cube([0.0; 3]), &cube([1.0, 1.0, 0.0]));
+    input.faces.iter_mut().nth(3).expect("a face").corners_mut().swap(0, 1);
+    let Facet::Tri([a, b, c]) = *input.faces.iter().nth(20).expect("a face") else { unreachable!("all are triangles") };
+    input.faces.push(Facet::Tri([b, c, a]));
+    let Facet::Tri([a, b, c]) = *input.faces.iter().nth(8).expect("a face") else { unreachable!("all are triangles") };
+    let middle = input.points.push(input.points[a].midpoint(input.points[b]));
+    *input.faces.iter_mut().nth(8).expect("a face") = Facet::Tri([a, middle, c]);
+    input.faces.push(Facet::Tri([middle, b, c]));
+    input
+}
+
+#[test]
+fn scaled_moved_mirrored_and_reordered_input_gives_the_same_counts() {
+    let counts = |soup: &Soup| {
+        let (surface, s) = run(soup);
+        let counts = [s.vertices_merged, s.repeated_faces, s.t_junctions, s.vertex_copies, s.components];
+        (counts, surface.points.len(), surface.faces.len(), euler(&surface), volume(&surface) > 0.0)
+    };
+    let input = broken_cubes();
+    let expected = counts(&input);
+    assert_eq!((expected.0, expected.3), ([58, 1, 1, 2, 2], (4, 0)));
+    let moved =
+        |map: &dyn Fn(DVec3) -> DVec3| Soup { points: input.points.iter().map(|&p| map(p)).collect(), ..input.clone() };
+    assert_eq!(counts(&moved(&|p| p * 1e6)), expected);
+    assert_eq!(counts(&moved(&|p| p * 1e-6)), expected);
+    assert_eq!(counts(&moved(&|p| p + DVec3::new(3e4, -2e4, 1e4))), expected);
+    assert_eq!(counts(&moved(&|p| DVec3::new(-p.x, p.y, p.z))), expected);
+    let reversed = Soup { faces: input.faces.iter().rev().copied().collect(), ..input.clone() };
+    assert_eq!(counts(&reversed), expected);
+}
+
+proptest::proptest! {
+    #![proptest_config(proptest::test_runner::Config { cases: 200, failure_persistence: None, ..Default::default() })]
+    #[test]
+    fn broken_soup_gives_a_manifold_or_a_typed_error(
+        base in 0_usize..4,
+        edits in proptest::collection::vec((0_u8..7, 0_usize..1000, 0_usize..1000), 0..12),
+        fill in proptest::bool::ANY,
+        seam in proptest::bool::ANY,
+    ) {
+        let base = [cube([0.0; 3]), broken_cubes(), sphere(5, 0, 4), merged(sphere(4, 0, 4), &t_joint())][base].clone();
+        let input = edits.into_iter().fold(base, |soup, (kind, i, j)| break_it(soup, kind, i, j));
+        let mut params = if fill { fill_all() } else { RepairParams::default() };
+        if seam {
+            params.non_manifold = meshmill::steps::repair::NonManifold::Seam;
+        }
+        if let Ok((surface, stats)) = repair(&input, &params, &Watch::silent()) {
+            check_manifold(&surface);
+            proptest::prop_assert!(stats.max_move <= 1e-4 * 10.0);
+            let (again, _) = repair(&surface.to_soup(), &params, &Watch::silent()).expect("repairs again");
+            check_manifold(&again);
+            if !fill {
+                proptest::prop_assert!(again == surface, "repairing again changes something");
+            }
+        }
+    }
+}
+
+/// Drops, turns, repeats, splits, collapses, moves or bends an element of a soup.
+fn break_it(mut soup: Soup, kind: u8, i: usize, j: usize) -> Soup {
+    let mut faces: Vec<Facet> = soup.faces.iter().copied().collect();
+    if faces.is_empty() {
+        return soup;
+    }
+    let (f, g) = (i % faces.len(), j % faces.len());
+    let (v, w) = (faces[f].corners()[j % 3], faces[g].corners()[i % 3]);
+    match kind {
+        0 => {
+            faces.remove(f);
+        }
+        1 => faces[f].corners_mut().swap(0, 1),
+        2 => faces.push(faces[f]),
+        3 => {
+            let [a, b, c] = [0, 1, 2].map(|k| faces[f].corners()[k]);
+            let middle = soup.points.push(soup.points[a].lerp(soup.points[b], 0.1 + 0.8 * (j as f64 / 1000.0)));
+            faces[f] = Facet::Tri([a, middle, c]);
+            faces.push(Facet::Tri([middle, b, c]));
+        }
+        4 => faces[f].corners_mut()[0] = w,
+        5 => soup.points[v] += DVec3::splat(1e-7),
+        _ => soup.points[v] = soup.points[w],
+    }
+    soup.faces = faces.into();
+    soup
+}

@@ -13,7 +13,7 @@
 //! # Invariants
 //! - The result is an oriented 2-manifold, with a border where the input has one that was not filled.
 //! - Outside filled holes the surface moves no further than `max-move`.
-//! - Idempotent: repairing the result changes nothing.
+//! - Idempotent: repairing the result changes nothing, unless `rounds` says that it was given up after eight.
 //! - Groups, regions, marks and fields follow their elements.
 //! - Closed manifold input keeps its topology: nothing but open edges is welded within a tolerance.
 //!
@@ -21,6 +21,8 @@
 //! O(F log F) time, O(F) memory.
 //!
 //! # Departures
+//! Sheets that hang on a solid are not dropped: they are cut off, listed as components, and `keep-components` drops them.
+//!
 //! Guéziec and others stitch borders again after cutting; here faces are joined before the cut, in radial order, so
 //! that solids which touch come apart as solids and sheets go straight on.
 
@@ -33,6 +35,7 @@ mod draft;
 mod duplicate;
 mod fill;
 mod holes;
+mod intersect;
 mod non_manifold;
 mod orient;
 mod outward;
@@ -50,6 +53,7 @@ use glam::DVec3;
 use self::adjacency::{EdgeTable, Twins, face_of};
 use self::draft::Draft;
 use self::outward::Part;
+use crate::mesh::geometry::Aabb;
 use crate::mesh::{Facet, Soup, Surface};
 use crate::step::{Artifact, InputDef, Inputs, Locks, OutPort, OutputDef, Port, Produced, StepFailure};
 use crate::watch::Watch;
@@ -60,13 +64,37 @@ use crate::watch::Watch;
 /// [`RepairError`]: nothing to repair, nothing left of it, or a corner that is not there.
 pub fn repair(soup: &Soup, params: &RepairParams, watch: &Watch) -> Result<(Surface, RepairStats), RepairError> {
     let diagonal = check_input(soup)?;
-    let mut stats = RepairStats::default();
     let limit = params.max_move.unwrap_or(params.weld).resolve(diagonal);
     let tolerance = params.weld.resolve(diagonal).min(limit);
-    let mut draft = conform(soup, tolerance, &mut stats);
+    let (mut surface, mut stats) = repair_once(soup, params, tolerance, limit, watch)?;
+    // What a cut or a dropped face uncovers may need repair as well: go on until nothing changes.
+    let mut unsettled = stats.vertex_copies + stats.repeated_faces + stats.cancelled_faces + stats.slivers_dropped > 0;
+    while unsettled && stats.rounds < ROUNDS {
+        let rest = (limit - stats.max_move).max(0.0);
+        let (again, more) = repair_once(&surface.to_soup(), params, tolerance.min(rest), rest, watch)?;
+        unsettled = again != surface;
+        stats.go_on(more);
+        surface = again;
+    }
+    watch.check()?;
+    count_intersections(&surface, soup, &mut stats);
+    Ok((surface, stats))
+}
+
+/// One run of all passes.
+fn repair_once(
+    soup: &Soup,
+    params: &RepairParams,
+    tolerance: f64,
+    limit: f64,
+    watch: &Watch,
+) -> Result<(Surface, RepairStats), RepairError> {
+    let mut stats = RepairStats::default();
+    let mut draft = conform(soup, params, tolerance, &mut stats);
     watch.check()?;
     let mut twins = make_clean_manifold(&mut draft, soup, params, limit, &mut stats, watch)?;
     let mut parts = choose_components(&mut draft, &mut twins, params, &mut stats)?;
+    let diagonal = parts.iter().fold(Aabb::EMPTY, |all, part| all.with(part.low).with(part.high)).diagonal();
     if holes::fill_holes(&mut draft, &mut twins, params.fill_holes, diagonal, &mut stats, watch)? {
         parts = components::components(&draft, &twins);
     }
@@ -91,21 +119,33 @@ fn check_input(soup: &Soup) -> Result<f64, RepairError> {
 }
 
 /// Triangles that share vertices wherever they touch.
-fn conform(soup: &Soup, tolerance: f64, stats: &mut RepairStats) -> Draft {
+fn conform(soup: &Soup, params: &RepairParams, tolerance: f64, stats: &mut RepairStats) -> Draft {
     let mut draft = draft::triangulate_and_weld_exactly(soup);
     stats.quads_split = soup.faces.iter().filter(|facet| matches!(facet, Facet::Quad(_))).count() as u64;
     stats.vertices_merged = (soup.points.len() - draft.points.len()) as u64;
     stats.collapsed_faces = duplicate::drop_collapsed(&mut draft);
     let table = EdgeTable::new(&draft.faces, draft.points.len());
     stats.non_manifold_edges_read = count_non_manifold(&table);
+    // A face that is there twice would hide an open edge from welding.
+    let table = drop_duplicates(&mut draft, table, params, stats);
     let welded = weld::weld(&mut draft, &table, tolerance);
     (stats.vertices_welded, stats.max_move) = (welded.vertices, welded.shift);
     stats.collapsed_faces += duplicate::drop_collapsed(&mut draft);
     let table = if welded.vertices > 0 { EdgeTable::new(&draft.faces, draft.points.len()) } else { table };
     stats.non_manifold_edges_welded = count_non_manifold(&table);
+    let table = drop_duplicates(&mut draft, table, params, stats);
     let closed = tjunction::close_t_junctions(&mut draft, &table, tolerance - welded.shift);
     (stats.t_junctions, stats.max_move) = (closed.vertices, welded.shift + closed.distance);
     draft
+}
+
+/// Drops repeated faces; returns the table of the others.
+fn drop_duplicates(draft: &mut Draft, table: EdgeTable, params: &RepairParams, stats: &mut RepairStats) -> EdgeTable {
+    let duplicates = duplicate::drop_duplicates(draft, &table, params.non_manifold == NonManifold::Cut);
+    stats.repeated_faces += duplicates.repeated;
+    stats.cancelled_faces += duplicates.cancelled;
+    let is_changed = duplicates.repeated + duplicates.cancelled > 0;
+    if is_changed { EdgeTable::new(&draft.faces, draft.points.len()) } else { table }
 }
 
 fn count_non_manifold(table: &EdgeTable) -> u64 {
@@ -130,11 +170,7 @@ fn make_clean_manifold(
     loop {
         stats.rounds += 1;
         let table = EdgeTable::new(&draft.faces, draft.points.len());
-        let duplicates = duplicate::drop_duplicates(draft, &table, params.non_manifold == NonManifold::Cut);
-        stats.repeated_faces += duplicates.repeated;
-        stats.cancelled_faces += duplicates.cancelled;
-        let was_changed = duplicates.repeated + duplicates.cancelled > 0;
-        let table = if was_changed { EdgeTable::new(&draft.faces, draft.points.len()) } else { table };
+        let table = drop_duplicates(draft, table, params, stats);
         let mut twins = make_manifold(draft, table, stats);
         watch.check()?;
         let is_clean = clean(draft, &mut twins, soup, limit, stats);
@@ -234,6 +270,22 @@ fn check_result(draft: &Draft, stats: &RepairStats, limit: f64) -> Result<(), Re
         return Err(RepairError::MovedTooFar { moved: stats.max_move, allowed: limit });
     }
     Ok(())
+}
+
+/// Counts faces that run through each other, before and after; where nothing was changed, once.
+fn count_intersections(surface: &Surface, soup: &Soup, stats: &mut RepairStats) {
+    let after = intersect::self_intersections(surface.faces.len(), |f| surface.corners(f));
+    let changes = stats.vertices_welded + stats.t_junctions + stats.edges_collapsed + stats.edges_flipped;
+    let dropped = stats.repeated_faces + stats.cancelled_faces + stats.slivers_dropped + stats.components_dropped;
+    let added = stats.faces_filled + stats.double_edges_split;
+    stats.self_intersections_before = if changes + dropped + added == 0 {
+        after.pairs
+    } else {
+        let mut input = draft::triangulate_and_weld_exactly(soup);
+        duplicate::drop_collapsed(&mut input);
+        intersect::self_intersections(input.faces.len(), |f| input.corners(f)).pairs
+    };
+    (stats.self_intersections, stats.self_intersecting_faces) = (after.pairs, after.faces);
 }
 
 /// The room's entry in the catalog.

@@ -45,8 +45,6 @@ pub struct RepairStats {
     pub double_edges_split: u64,
     /// Edges cut because their faces cannot agree on a side, as in a Möbius strip.
     pub one_sided_edges_cut: u64,
-    /// Tiny sheets without thickness that hung on a solid and were dropped.
-    pub dangling_faces: u64,
     /// Faces turned round to agree with their neighbours.
     pub faces_turned: u64,
     /// Closed components turned round as a whole to look outward.
@@ -77,14 +75,43 @@ pub struct RepairStats {
     pub components_dropped: u64,
     /// The first components, in the order of their faces.
     pub component_list: Vec<ComponentStats>,
-    /// Pairs of faces that run through each other in the input, once welded; absent where it was not counted.
-    pub self_intersections_before: Option<u64>,
-    /// Pairs of faces that run through each other in the result.
-    pub self_intersections: Option<u64>,
+    /// Pairs of faces that run through or touch each other in the input.
+    pub self_intersections_before: u64,
+    /// Pairs of faces that run through or touch each other in the result.
+    pub self_intersections: u64,
     /// The first faces of the result that run through others.
     pub self_intersecting_faces: Vec<u32>,
     /// How far the surface may have moved outside filled holes at most: a bound, in mesh units.
     pub max_move: f64,
+}
+
+impl RepairStats {
+    /// Adds what a further round did to the result of the rounds before.
+    pub(super) fn go_on(&mut self, more: Self) {
+        self.rounds += more.rounds;
+        self.vertices_welded += more.vertices_welded;
+        self.collapsed_faces += more.collapsed_faces;
+        self.repeated_faces += more.repeated_faces;
+        self.cancelled_faces += more.cancelled_faces;
+        self.t_junctions += more.t_junctions;
+        self.double_edges_split += more.double_edges_split;
+        self.faces_turned += more.faces_turned;
+        self.components_turned += more.components_turned;
+        self.degenerate_faces = self.degenerate_faces.max(more.degenerate_faces);
+        self.edges_collapsed += more.edges_collapsed;
+        self.edges_flipped += more.edges_flipped;
+        self.slivers_dropped += more.slivers_dropped;
+        self.holes_filled += more.holes_filled;
+        self.faces_filled += more.faces_filled;
+        self.components_dropped += more.components_dropped;
+        self.max_move += more.max_move;
+        // What a round found and did not change is true of the last one.
+        self.vertices_cut = more.vertices_cut;
+        self.vertex_copies = more.vertex_copies;
+        self.one_sided_edges_cut = more.one_sided_edges_cut;
+        self.cavities = more.cavities;
+        self.degenerate_faces_left = more.degenerate_faces_left;
+    }
 }
 
 /// A boundary loop.

@@ -1,0 +1,115 @@
+//! Faces that run through each other, counted exactly.
+//!
+//! Nearly all pairs whose boxes meet are neighbours, for which exact predicates are slowest because their answers are
+//! zero: these are first tried with tests in plain arithmetic that may only say "apart for certain".
+
+use std::ops::ControlFlow;
+
+use glam::DVec3;
+
+use super::draft::normal;
+use crate::mesh::FaceId;
+use crate::mesh::bvh::TriangleBvh;
+use crate::mesh::predicate::triangle_triangle;
+
+/// How many faces are listed.
+const LISTED: usize = 20;
+
+/// What was found.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Intersections {
+    /// Pairs of faces with common points beyond shared corners and edges.
+    pub(super) pairs: u64,
+    /// The lowest faces among them, ascending.
+    pub(super) faces: Vec<u32>,
+}
+
+/// Counts the pairs.
+pub(super) fn self_intersections(count: usize, corners: impl Fn(FaceId) -> [DVec3; 3]) -> Intersections {
+    let bvh = TriangleBvh::new((0..count).map(|f| corners(FaceId::new(f))).collect());
+    let mut found = Intersections::default();
+    let mut faces = std::collections::BTreeSet::new();
+    let _ = bvh.for_each_self_pair(|i, j| {
+        let [a, b] = [i, j].map(|f| corners(FaceId::from_raw(f)));
+        if !is_surely_apart(a, b) && triangle_triangle(a, b).is_intersection() {
+            found.pairs += 1;
+            faces.extend([i, j]);
+            if faces.len() > 2 * LISTED {
+                faces = faces.iter().copied().take(LISTED).collect();
+            }
+        }
+        ControlFlow::Continue(())
+    });
+    found.faces = faces.into_iter().take(LISTED).collect();
+    found
+}
+
+/// A sign of plain arithmetic counts beyond this share of the magnitudes; rounding stays some thousand times below.
+const MARGIN: f64 = 1e-12;
+
+fn is_surely_apart(a: [DVec3; 3], b: [DVec3; 3]) -> bool {
+    let shared = |p: DVec3, other: [DVec3; 3]| other.contains(&p);
+    let [own_a, own_b] = [(a, b), (b, a)].map(|(t, other)| t.map(|p| !shared(p, other)));
+    let (normal_a, normal_b) = (normal(a), normal(b));
+    match own_a.iter().filter(|&&own| own).count() {
+        // They share an edge: only faces folded flat onto each other have more in common.
+        1 => {
+            let aligned = normal_a.dot(normal_b);
+            let size = (normal_a.length_squared() * normal_b.length_squared()).sqrt();
+            size > 0.0 && is_fold_impossible(a, own_a, b, own_b, aligned, size)
+        }
+        2 => {
+            is_beyond(a, normal_a, b, own_b) || is_beyond(b, normal_b, a, own_a) || are_wedges_apart(a, b, own_a, own_b)
+        }
+        _ => is_beyond(a, normal_a, b, own_b) || is_beyond(b, normal_b, a, own_a),
+    }
+}
+
+/// Whether the faces at an edge are not in one plane, or lie on different sides of the edge in it.
+fn is_fold_impossible(
+    a: [DVec3; 3],
+    own_a: [bool; 3],
+    b: [DVec3; 3],
+    own_b: [bool; 3],
+    aligned: f64,
+    size: f64,
+) -> bool {
+    if aligned.abs() < 0.999 * size {
+        return true;
+    }
+    let (Some(i), Some(j)) = (own_a.iter().position(|&own| own), own_b.iter().position(|&own| own)) else {
+        return false;
+    };
+    let along = a[(i + 2) % 3] - a[(i + 1) % 3];
+    let from = a[(i + 1) % 3];
+    let [p, q] = [a[i] - from, b[j] - from].map(|p| p * along.length_squared() - along * p.dot(along));
+    p.dot(q) < -MARGIN * (p.length_squared() * q.length_squared()).sqrt()
+}
+
+/// Whether all of `b` that is not shared is strictly on one side of the plane of `a`.
+fn is_beyond(a: [DVec3; 3], normal_a: DVec3, b: [DVec3; 3], own_b: [bool; 3]) -> bool {
+    let (mut above, mut below) = (true, true);
+    for (p, _) in b.into_iter().zip(own_b).filter(|(_, own)| *own) {
+        let offset = p - a[0];
+        let height = normal_a.dot(offset);
+        let noise = MARGIN * normal_a.length() * (offset.length() + p.abs().max_element());
+        above &= height > noise;
+        below &= height < -noise;
+    }
+    above || below
+}
+
+/// Whether a plane through the one shared corner has the faces on different sides.
+fn are_wedges_apart(a: [DVec3; 3], b: [DVec3; 3], own_a: [bool; 3], own_b: [bool; 3]) -> bool {
+    let Some(tip) = own_a.iter().position(|&own| !own).map(|i| a[i]) else { return false };
+    let rays = |t: [DVec3; 3], own: [bool; 3]| {
+        let mut own_corners =
+            t.into_iter().zip(own).filter(|(_, own)| *own).map(|(p, _)| (p - tip).normalize_or_zero());
+        [own_corners.next().unwrap_or_default(), own_corners.next().unwrap_or_default()]
+    };
+    let ([a0, a1], [b0, b1]) = (rays(a, own_a), rays(b, own_b));
+    let across = (a0 + a1).normalize_or_zero() - (b0 + b1).normalize_or_zero();
+    // Rays are rounded in the unit sphere, but the corners they come from as far out as the mesh lies.
+    let noise = 1e-9;
+    a0.dot(across) > noise && a1.dot(across) > noise && b0.dot(across) < -noise && b1.dot(across) < -noise
+}
