@@ -1,6 +1,5 @@
 //! Numbers of binary formats: a bounds-checked reader in either byte order.
 
-
 use super::error::{FormatError, Place, Reason};
 
 /// The order of the bytes in a number.

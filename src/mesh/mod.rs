@@ -13,6 +13,7 @@ pub mod predicate;
 pub mod soup;
 pub mod surface;
 pub mod topology;
+pub mod transfer;
 pub mod validate;
 
 pub use carried::{Carried, EdgeKey, EdgeMark, Field, Freedom, Groups, MarkCause, Regions, SeamId, Support, edge_key};

@@ -7,6 +7,7 @@ pub mod measure;
 pub mod read;
 pub mod refine;
 pub mod repair;
+pub mod select;
 pub mod subdivide;
 
 use crate::step::StepDef;
@@ -15,6 +16,7 @@ use crate::step::StepDef;
 pub static CATALOG: &[StepDef] = &[
     StepDef::of::<read::Step>(),
     StepDef::of::<repair::Step>(),
+    StepDef::of::<select::Step>(),
     StepDef::of::<features::Step>(),
     StepDef::of::<subdivide::Step>(),
     StepDef::of::<refine::Step>(),
