@@ -120,7 +120,7 @@ pub struct FileReport {
 pub struct Timings {
     /// Seconds of the run.
     pub total: f64,
-    /// State and seconds by task label.
+    /// State and seconds of each step (`STEP`, or `CASE/STEP` in a sweep) and gate.
     pub tasks: BTreeMap<String, (TaskState, f64)>,
     /// State of each output file.
     pub files: BTreeMap<String, FileState>,
@@ -133,11 +133,18 @@ impl Report {
         let mut inputs = BTreeMap::new();
         for id in plan.order() {
             let (node, task) = (plan.node(id), outcome.task(id));
-            if let Task::Source(source) = &node.task {
-                inputs.insert(source.path.display().to_string(), task.content.map(|hash| hash.to_hex().to_string()));
-            } else {
-                let seconds = task.entry.as_ref().map_or(0.0, |entry| entry.seconds);
-                timings.tasks.insert(node.label.clone(), (task.state, seconds));
+            match &node.task {
+                Task::Source(source) => {
+                    let content = task.content.map(|hash| hash.to_hex().to_string());
+                    inputs.insert(source.path.display().to_string(), content);
+                }
+                Task::Gate(_) => timings.note(node.label.clone(), task),
+                Task::Step(_) => {}
+            }
+        }
+        for case in plan.cases() {
+            for (step, task) in &case.steps {
+                timings.note(in_case(&case.name, step), outcome.task(*task));
             }
         }
         for file in &outcome.files {
@@ -157,6 +164,18 @@ impl Report {
             steps.chain(gates).chain(files)
         })
     }
+}
+
+impl Timings {
+    fn note(&mut self, name: String, task: &TaskOutcome) {
+        let seconds = task.entry.as_ref().map_or(0.0, |entry| entry.seconds);
+        self.tasks.insert(name, (task.state, seconds));
+    }
+}
+
+/// The name of a step within all cases: `STEP`, or `CASE/STEP` in a sweep.
+pub fn in_case(case: &str, step: &str) -> String {
+    if case.is_empty() { step.to_owned() } else { format!("{case}/{step}") }
 }
 
 fn status(outcome: &RunOutcome) -> Status {

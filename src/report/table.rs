@@ -5,7 +5,7 @@ use std::fmt::Write;
 use comfy_table::{CellAlignment, Table};
 
 use super::measure::{number_text, rows, value_text};
-use super::{CaseReport, Report};
+use super::{CaseReport, Report, in_case};
 use crate::metric::Measurement;
 use crate::run::{Figures, FileState, TaskState};
 
@@ -44,7 +44,8 @@ pub fn measurement(metrics: &Measurement) -> String {
 fn steps(case: &CaseReport, report: &Report) -> String {
     let mut table = plain(&["step", "kind", "state", "seconds", "faces", "min stretch", "mean stretch"]);
     for step in &case.steps {
-        let (state, seconds) = report.timings.tasks.get(&step.name).copied().unwrap_or((TaskState::Cached, 0.0));
+        let (state, seconds) =
+            report.timings.tasks.get(&in_case(&case.name, &step.name)).copied().unwrap_or((TaskState::Cached, 0.0));
         let figures = step.figures.clone().unwrap_or_default();
         let seconds = if step.figures.is_some() { format!("{seconds:.2}") } else { String::new() };
         table.add_row([

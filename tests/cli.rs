@@ -1,0 +1,176 @@
+//! The command as people use it: output, files and exit codes, in a folder of its own.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use assert_cmd::Command;
+use predicates::prelude::*;
+
+const RECIPE: &str = r#"
+name = "part"
+[inputs]
+part = "cube.obj"
+[params]
+limit = 0.1
+[steps.raw]
+use = "read"
+file = "=inputs.part"
+[steps.clean]
+use = "repair"
+from = "raw"
+[gates.clean]
+closed = true
+min-stretch = { at-least = "=limit" }
+[outputs]
+clean = ["result.stl", "result.vtu"]
+"#;
+
+const CUBE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1\n\
+    f 1 3 2\nf 1 4 3\nf 5 6 7\nf 5 7 8\nf 1 2 6\nf 1 6 5\nf 2 3 7\nf 2 7 6\nf 3 4 8\nf 3 8 7\nf 4 1 5\nf 4 5 8\n";
+
+struct Desk {
+    folder: tempfile::TempDir,
+}
+
+impl Desk {
+    fn new() -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        fs::write(folder.path().join("recipe.toml"), RECIPE).unwrap();
+        fs::write(folder.path().join("cube.obj"), CUBE).unwrap();
+        Self { folder }
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    fn meshmill(&self, arguments: &[&str]) -> Command {
+        let mut command = Command::new(assert_cmd::cargo::cargo_bin!("meshmill"));
+        command.current_dir(self.folder.path()).env("MESHMILL_CACHE", self.path("cache")).args(arguments);
+        command
+    }
+}
+
+fn names(folder: &Path) -> Vec<String> {
+    let mut names: Vec<_> =
+        fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned()).collect();
+    names.sort();
+    names
+}
+
+#[test]
+fn a_run_writes_its_files_and_a_second_one_finds_them_right() {
+    let desk = Desk::new();
+    let first = desk.meshmill(&["run", "recipe.toml"]).assert().success();
+    first.stdout(predicate::str::contains("written").and(predicate::str::contains("passed")));
+    assert_eq!(names(&desk.path("out/part")), ["result.stl", "result.vtu", "run.ron"]);
+    let before = fs::metadata(desk.path("out/part/result.stl")).unwrap().modified().unwrap();
+    let second = desk.meshmill(&["run", "recipe.toml"]).assert().success();
+    second.stdout(predicate::str::contains("up to date").and(predicate::str::contains("done").not()));
+    assert_eq!(fs::metadata(desk.path("out/part/result.stl")).unwrap().modified().unwrap(), before);
+}
+
+#[test]
+fn a_failed_gate_exits_with_3_and_shows_the_elements() {
+    let desk = Desk::new();
+    desk.meshmill(&["run", "recipe.toml"]).assert().success();
+    let failed = desk.meshmill(&["run", "recipe.toml", "--set", "limit=0.99"]).assert().code(3);
+    failed.stdout(predicate::str::contains("FAILED, 12 elements"));
+    assert_eq!(names(&desk.path("out/part")), ["failed", "run.ron"]);
+    assert_eq!(names(&desk.path("out/part/failed")), ["failed.vtu", "result.stl", "result.vtu"]);
+    desk.meshmill(&["run", "recipe.toml"]).assert().success();
+    assert_eq!(names(&desk.path("out/part")), ["result.stl", "result.vtu", "run.ron"]);
+}
+
+#[test]
+fn a_wrong_recipe_or_argument_exits_with_2_and_runs_nothing() {
+    let desk = Desk::new();
+    let unknown = RECIPE.replace("use = \"repair\"", "use = \"repiar\"");
+    fs::write(desk.path("wrong.toml"), unknown).unwrap();
+    let wrong = desk.meshmill(&["run", "wrong.toml"]).assert().code(2);
+    wrong.stderr(predicate::str::contains("wrong.toml:").and(predicate::str::contains("`repair`")));
+    desk.meshmill(&["run", "missing.toml"]).assert().code(2);
+    desk.meshmill(&["run", "recipe.toml", "--only", "claen"])
+        .assert()
+        .code(2)
+        .stderr(predicate::str::contains("clean"));
+    desk.meshmill(&["run", "recipe.toml", "--jobs", "0"]).assert().code(2);
+    desk.meshmill(&["no-such-command"]).assert().code(2);
+    assert!(!desk.path("out").exists());
+}
+
+#[test]
+fn a_damaged_input_exits_with_2() {
+    let desk = Desk::new();
+    fs::write(desk.path("cube.obj"), "v 0 0 0\nf 1 2 3\n").unwrap();
+    desk.meshmill(&["run", "recipe.toml"]).assert().code(2).stderr(predicate::str::contains("raw"));
+}
+
+#[test]
+fn a_cache_that_cannot_be_used_exits_with_6() {
+    let desk = Desk::new();
+    desk.meshmill(&["run", "recipe.toml", "--cache", "cube.obj"]).assert().code(6);
+}
+
+#[test]
+fn json_is_one_document_on_stdout() {
+    let desk = Desk::new();
+    let output = desk.meshmill(&["run", "recipe.toml", "--json", "-q"]).assert().success().get_output().stdout.clone();
+    let report: serde_json::Value = serde_json::from_slice(&output).unwrap();
+    assert_eq!(report["status"], "done");
+    assert_eq!(report["cases"][0]["steps"][1]["figures"]["faces"], 12);
+    assert_eq!(report["cases"][0]["gates"][0]["passed"], true);
+}
+
+#[test]
+fn plan_tells_why_a_task_has_to_run() {
+    let desk = Desk::new();
+    let new = desk.meshmill(&["plan", "recipe.toml"]).assert().success();
+    new.stdout(predicate::str::contains("runs: new").and(predicate::str::contains("depends on raw")));
+    desk.meshmill(&["run", "recipe.toml", "-q"]).assert().success();
+    desk.meshmill(&["plan", "recipe.toml"]).assert().success().stdout(predicate::str::contains("0 of 3 tasks to run"));
+    let changed = desk.meshmill(&["plan", "recipe.toml", "--set", "limit=0.2"]).assert().success();
+    changed.stdout(predicate::str::contains("from 0.1 to 0.2").and(predicate::str::contains("1 of 3 tasks to run")));
+}
+
+#[test]
+fn the_smaller_commands_answer() {
+    let desk = Desk::new();
+    desk.meshmill(&["check", "recipe.toml"]).assert().success();
+    for format in ["dot", "mermaid"] {
+        let graph = desk.meshmill(&["graph", "recipe.toml", "--format", format]).assert().success();
+        graph.stdout(predicate::str::contains("clean"));
+    }
+    desk.meshmill(&["measure", "cube.obj"]).assert().success().stdout(predicate::str::contains("volume"));
+    let json = desk.meshmill(&["measure", "cube.obj", "--json"]).assert().success().get_output().stdout.clone();
+    serde_json::from_slice::<serde_json::Value>(&json).unwrap();
+    desk.meshmill(&["convert", "cube.obj", "cube.ply"]).assert().success();
+    let measured = desk.meshmill(&["measure", "cube.ply", "--reference", "cube.obj"]).assert().success();
+    measured.stdout(predicate::str::contains("distance"));
+    desk.meshmill(&["convert", "cube.obj", "cube.nonsense"]).assert().code(2);
+    desk.meshmill(&["steps"]).assert().success().stdout(predicate::str::contains("repair"));
+    desk.meshmill(&["steps", "repair"]).assert().success().stdout(predicate::str::contains("fill-holes"));
+    desk.meshmill(&["steps", "repiar"]).assert().code(2).stderr(predicate::str::contains("`repair`"));
+    desk.meshmill(&["completions", "bash"]).assert().success().stdout(predicate::str::contains("meshmill"));
+}
+
+#[test]
+fn the_cache_can_be_looked_after() {
+    let desk = Desk::new();
+    desk.meshmill(&["run", "recipe.toml", "-q"]).assert().success();
+    desk.meshmill(&["cache", "stat"]).assert().success().stdout(predicate::str::contains("artifacts  2"));
+    desk.meshmill(&["cache", "verify"]).assert().success();
+    let gc = desk.meshmill(&["cache", "gc", "--max-size", "0", "--dry-run"]).assert().success();
+    gc.stdout(predicate::str::contains("would remove"));
+    desk.meshmill(&["cache", "clear"]).assert().success();
+    desk.meshmill(&["cache", "stat"]).assert().success().stdout(predicate::str::contains("artifacts  0"));
+}
+
+#[test]
+fn a_trace_is_a_timeline_in_json() {
+    let desk = Desk::new();
+    desk.meshmill(&["run", "recipe.toml", "-q", "--trace", "trace.json"]).assert().success();
+    let trace: serde_json::Value = serde_json::from_slice(&fs::read(desk.path("trace.json")).unwrap()).unwrap();
+    let names: Vec<_> = trace["traceEvents"].as_array().unwrap().iter().map(|event| event["name"].clone()).collect();
+    assert!(names.contains(&"clean".into()), "{names:?}");
+}
