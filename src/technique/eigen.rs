@@ -20,7 +20,7 @@ pub fn symmetric_eigen(matrix: &Symmetric) -> [(f64, DVec3); 3] {
     let scale = matrix.iter().fold(0.0_f64, |s, x| s.max(x.abs()));
     for _ in 0..MOST_SWEEPS {
         let off = m[0][1].abs().max(m[0][2].abs()).max(m[1][2].abs());
-        if !(off > 1e-300_f64.max(scale * 1e-18)) {
+        if off.is_nan() || off <= 1e-300_f64.max(scale * 1e-18) {
             break;
         }
         for (p, q) in [(0, 1), (0, 2), (1, 2)] {
