@@ -8,6 +8,7 @@ pub mod plan;
 pub mod recipe;
 pub mod report;
 pub mod run;
+pub mod schema;
 pub mod step;
 pub mod steps;
 pub mod store;

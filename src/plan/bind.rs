@@ -13,7 +13,7 @@ use toml::de::{DeValue, ValueDeserializer};
 
 use super::case::CaseContext;
 use crate::recipe::suggest::{closest, did_you_mean};
-use crate::recipe::{Diagnostic, Entry, Node, Span, StepDecl, Table};
+use crate::recipe::{Diagnostic, Entry, Node, Span, StepDecl, Table, normalize};
 use crate::step::parameters::ParameterSchema;
 use crate::step::{BoundStep, Locks, Port, StepDef};
 
@@ -103,7 +103,7 @@ fn take_file(bound: &mut BoundDecl<'_>, input: &'static str, entry: &Entry, cont
         return;
     };
     if let Err(reason) = context.check_file(&path) {
-        let mut problem = Diagnostic::error(entry.value.span, format!("cannot read `{}`: {reason}", path.display()));
+        let mut problem = Diagnostic::error(entry.value.span, format!("cannot read `{}`: {reason}", normalize(&path).display()));
         let used = context.recipe.inputs.in_order().into_iter().find(|(_, input)| {
             matches!(entry.value.value, Node::File(_)) && context.recipe.file(&input.value).as_ref() == Some(&path)
         });

@@ -6,6 +6,7 @@
 mod bind;
 mod build;
 mod case;
+pub mod draw;
 mod gates;
 pub mod key;
 pub mod merge;
@@ -30,7 +31,7 @@ pub use case::{CaseSpec, Context};
 pub use gates::CHECK_KEYS;
 pub use key::{Change, ContentHash, Key, Record, task_key, task_record};
 pub use merge::PlanBuilder;
-pub use outputs::{ELEMENTS, OUTPUT_KEYS};
+pub use outputs::{ELEMENTS, METRIC_ENDINGS, OUTPUT_KEYS};
 pub use task::{GateTask, SourceTask, StepTask, Task, TaskId};
 
 /// Position of a case in [`Plan::cases`].

@@ -9,12 +9,16 @@ use super::gates::is_mesh;
 use super::wire::{Producer, Wiring, producer};
 use crate::recipe::suggest::did_you_mean;
 use crate::recipe::{Diagnostic, Entry, Node, Span, Table, Tree};
+use crate::step::Port;
 
 /// The keys of an output table.
 pub const OUTPUT_KEYS: [&str; 6] = ["file", "element", "midside-on", "binary", "precision", "first-id"];
 
 /// The shell elements of solver formats.
 pub const ELEMENTS: [&str; 4] = ["S3", "S4", "S6", "S8R"];
+
+/// Endings of files that hold a table of metrics.
+pub const METRIC_ENDINGS: [&str; 2] = ["json", "ron"];
 
 /// Files that a run writes itself.
 const RESERVED: [&str; 2] = ["run.ron", "failed"];
@@ -39,13 +43,14 @@ pub(super) fn outputs<'r>(steps: &[BoundDecl<'r>], wiring: &Wiring, context: &mu
     let mut outputs = Vec::new();
     let recipe = reader.context.recipe;
     for (name, entry) in recipe.outputs.in_order() {
-        let producer = reader.mesh_step(name, entry.key);
+        let producer = producer(name, entry.key, reader.steps, recipe, &mut reader.context.problems);
+        let port = producer.and_then(|producer| reader.wiring.port(producer));
         let items = match &entry.value.value {
             Node::List(items) => items.as_slice(),
             _ => std::slice::from_ref(&entry.value),
         };
         for item in items {
-            let Some(mut output) = reader.output(name, item) else { continue };
+            let Some(mut output) = reader.output(name, port, item) else { continue };
             output.producer = producer;
             outputs.push(output);
         }
@@ -71,19 +76,18 @@ impl Reader<'_, '_> {
         if let Some(port) = self.wiring.port(found)
             && !is_mesh(port)
         {
-            let message = format!("`{name}` gives {port}, which is no mesh that could be written");
-            self.problem(span, message, Some("metrics are in the report of the run".to_owned()));
+            self.problem(span, format!("`{name}` gives {port}, which is no mesh"), None);
         }
         Some(found)
     }
 
-    fn output(&mut self, step: &str, item: &Tree) -> Option<OutputDecl> {
+    fn output(&mut self, step: &str, port: Option<Port>, item: &Tree) -> Option<OutputDecl> {
         let recipe = self.context.recipe;
         let value = self.context.scope.substitute(item, &recipe.sources, &mut self.context.problems)?;
         let mut output = OutputDecl { step: step.to_owned(), ..OutputDecl::default() };
         match &value.value {
-            Node::Text(_) => output.file = self.file(step, &value)?,
-            Node::Table(table) => self.table(step, &value, table, &mut output)?,
+            Node::Text(_) => output.file = self.file(step, port, &value)?,
+            Node::Table(table) => self.table(step, port, &value, table, &mut output)?,
             other => {
                 let message = format!("an output is a file name or a table with `file`, got {}", other.kind());
                 self.problem(value.span, message, None);
@@ -93,7 +97,14 @@ impl Reader<'_, '_> {
         Some(output)
     }
 
-    fn table(&mut self, step: &str, value: &Tree, table: &Table, output: &mut OutputDecl) -> Option<()> {
+    fn table(
+        &mut self,
+        step: &str,
+        port: Option<Port>,
+        value: &Tree,
+        table: &Table,
+        output: &mut OutputDecl,
+    ) -> Option<()> {
         for (key, entry) in table.in_order() {
             match key {
                 "file" => {}
@@ -121,7 +132,7 @@ impl Reader<'_, '_> {
             }
         }
         match table.get("file") {
-            Some(entry) => output.file = self.file(step, &entry.value)?,
+            Some(entry) => output.file = self.file(step, port, &entry.value)?,
             None => self.problem(value.span, "this output does not name its `file`", None),
         }
         Some(())
@@ -152,7 +163,7 @@ impl Reader<'_, '_> {
     }
 
     /// The file of an output, which is new, has a known ending and stays in the folder of the outputs.
-    fn file(&mut self, step: &str, value: &Tree) -> Option<PathBuf> {
+    fn file(&mut self, step: &str, port: Option<Port>, value: &Tree) -> Option<PathBuf> {
         let Node::Text(template) = &value.value else {
             self.problem(value.span, format!("`file` is a file name, got {}", value.value.kind()), None);
             return None;
@@ -167,10 +178,7 @@ impl Reader<'_, '_> {
             self.problem(value.span, message, Some(help.to_owned()));
             return None;
         }
-        let ending = path.extension().map(|ending| ending.to_string_lossy().to_lowercase()).unwrap_or_default();
-        if !self.context.endings.contains(&ending.as_str()) {
-            let help = did_you_mean(&ending, "endings", self.context.endings.iter().copied());
-            self.problem(value.span, format!("`{name}` has no ending of a format that can be written"), help);
+        if !self.ending_fits(path, &name, port, value.span) {
             return None;
         }
         let first = path.components().find(|part| *part != Component::CurDir);
@@ -189,6 +197,21 @@ impl Reader<'_, '_> {
             return None;
         }
         Some(file)
+    }
+
+    /// Whether the ending names a format that what the step gives can be written in.
+    fn ending_fits(&mut self, path: &Path, name: &str, port: Option<Port>, span: Span) -> bool {
+        let ending = path.extension().map(|ending| ending.to_string_lossy().to_lowercase()).unwrap_or_default();
+        let table = METRIC_ENDINGS.contains(&ending.as_str());
+        if !self.context.endings.contains(&ending.as_str()) {
+            let help = did_you_mean(&ending, "endings", self.context.endings.iter().copied());
+            self.problem(span, format!("`{name}` has no ending of a format that can be written"), help);
+            return false;
+        }
+        let Some(port) = port.filter(|port| is_mesh(*port) == table) else { return true };
+        let help = format!("meshes go to mesh files, metrics to files that end in {}", METRIC_ENDINGS.join(" or "));
+        self.problem(span, format!("{port} cannot be written to `{name}`"), Some(help));
+        false
     }
 
     /// Puts parameters, the recipe's name and the step's name into a template.

@@ -186,3 +186,38 @@ fn a_changed_field_changes_key_and_record_together() {
         task_record(other, 1, &inputs).changes_since(&record).iter().map(ToString::to_string).collect();
     assert_eq!(changes, ["parameter times from 6 to 8", "input `from` changed"]);
 }
+
+#[test]
+fn a_plan_can_be_drawn() {
+    let plan = planned(RECIPE);
+    insta::assert_snapshot!("dot", draw::dot(&plan));
+    insta::assert_snapshot!("mermaid", draw::mermaid(&plan));
+}
+
+proptest::proptest! {
+    #![proptest_config(proptest::prelude::ProptestConfig {
+        cases: 200, failure_persistence: None, ..Default::default()
+    })]
+
+    /// Any line of a good recipe replaced, repeated or cut gives a plan or a report, and never a panic.
+    #[test]
+    fn damaged_recipes_plan_or_are_explained(
+        line in 0_usize..30,
+        column in 0_usize..60,
+        text in "\\PC{0,8}|[a-z=\"{}\\[\\].%0-9 -]{0,8}|(raw|clean|fine|=size|fine\\.coarse)",
+        cut in 0_usize..20,
+    ) {
+        let mut lines: Vec<String> = RECIPE.lines().map(str::to_owned).collect();
+        let line = line % lines.len();
+        let characters: Vec<char> = lines[line].chars().collect();
+        let start = column.min(characters.len());
+        let end = (start + cut).min(characters.len());
+        lines[line] = characters[..start].iter().chain(text.chars().collect::<Vec<_>>().iter()).chain(&characters[end..]).collect();
+        let text = lines.join("\n");
+        let found = Recipe::load(Path::new("toy.toml"), &|_| Ok(text.clone()), &Overrides::default())
+            .and_then(|recipe| plan(&recipe, &context()));
+        if let Err(found) = found {
+            proptest::prop_assert!(!found.render(true).is_empty());
+        }
+    }
+}
