@@ -198,7 +198,7 @@ fn admit_expressions_inside(schema: &mut Value) {
                 *value = admitting_expressions(value.take());
             }
             ("anyOf" | "oneOf" | "allOf", Value::Array(choices)) => {
-                choices.iter_mut().for_each(admit_expressions_inside)
+                choices.iter_mut().for_each(admit_expressions_inside);
             }
             _ => {}
         }

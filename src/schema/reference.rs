@@ -164,7 +164,7 @@ fn metrics(page: &mut String) {
          `self-intersections = { no-more-than = \"STEP\" }`; `except` names face groups that are not judged.\n\n\
          | metric | unit | measured on | meaning |\n|---|---|---|---|\n",
     );
-    for metric in METRICS {
+    for metric in METRICS.iter() {
         let unit = match metric.unit {
             Unit::Count => "count",
             Unit::Flag => "true or false",
