@@ -132,6 +132,10 @@ pub struct ControlPropertiesStats {
     pub violations: Vec<Violation>,
     /// The tolerance in mesh units (their square in `quadric-sum` mode).
     pub tolerance: f64,
+    /// Certified upper bound of the two-sided distance to `reference`, in mesh units. Absent in the quadric modes, and
+    /// where the input was further away than the tolerance and could not be brought back.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub distance_bound: Option<f64>,
 }
 
 /// Why property control refused.
@@ -192,6 +196,7 @@ pub fn control_properties(
     let mut editor = open(input.surface, &freedom, input.reference, &tree, setup)?;
     let ending = run_phases(&mut editor, params, watch)?;
     let counts = editor.counts();
+    let distance_bound = editor.certified_distance(tolerance);
     let left = editor.into_mesh().leave();
     let freedom = resolve_freedom(&left.surface, &input.locks)?;
     let recount = recount(&left.surface, &freedom, &limits);
@@ -215,6 +220,7 @@ pub fn control_properties(
         vertices_over_valence: recount.over_valence,
         violations: recount.violations.into_iter().take(64).collect(),
         tolerance,
+        distance_bound,
     };
     Ok((left.surface, stats))
 }

@@ -117,6 +117,10 @@ pub struct ImproveQualityStats {
     pub max_valence: usize,
     /// The tolerance in mesh units (their square in `quadric-sum` mode).
     pub tolerance: f64,
+    /// Certified upper bound of the two-sided distance to `reference`, in mesh units. Absent in the quadric modes, and
+    /// where the input was further away than the tolerance and could not be brought back.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub distance_bound: Option<f64>,
 }
 
 /// Why quality improvement refused.
@@ -184,6 +188,7 @@ pub fn improve_quality(
     let mut editor = open(surface, &freedom, input.reference, &tree, setup)?;
     let ending = run_phases(&mut editor, params, watch)?;
     let counts = editor.counts();
+    let distance_bound = editor.certified_distance(tolerance);
     let result = editor.into_mesh().leave().surface;
     let before = recount(input.surface, &resolve_freedom(input.surface, &input.locks)?, &limits);
     let after = recount(&result, &resolve_freedom(&result, &input.locks)?, &limits);
@@ -205,6 +210,7 @@ pub fn improve_quality(
         max_size: after.max_size,
         max_valence: after.max_valence,
         tolerance,
+        distance_bound,
     };
     Ok((result, stats))
 }

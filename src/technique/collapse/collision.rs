@@ -63,6 +63,9 @@ pub struct Collision {
     head: Vec<u32>,
     next: Vec<u32>,
     leaf_of: Vec<u32>,
+    /// The box of each face; empty for faces that are gone.
+    face_box: Vec<SmallBox>,
+    new_boxes: Vec<SmallBox>,
     built_with: usize,
     added: usize,
     stack: Vec<u32>,
@@ -79,6 +82,8 @@ impl Collision {
             head: Vec::new(),
             next: Vec::new(),
             leaf_of: Vec::new(),
+            face_box: Vec::new(),
+            new_boxes: Vec::new(),
             built_with: 0,
             added: 0,
             stack: Vec::new(),
@@ -110,14 +115,17 @@ impl Collision {
         self.next.resize(mesh.face_slots(), NONE);
         self.leaf_of.clear();
         self.leaf_of.resize(mesh.face_slots(), NONE);
+        self.face_box.clear();
+        self.face_box.resize(mesh.face_slots(), SmallBox::EMPTY);
         for (place, &(_, face)) in order.iter().enumerate().rev() {
             let leaf = place * leaves / order.len();
             self.next[face as usize] = self.head[leaf];
             self.head[leaf] = face;
             self.leaf_of[face as usize] = leaf as u32;
-            let points = mesh.corner_points(FaceId::from_raw(face));
+            let own = SmallBox::of(&mesh.corner_points(FaceId::from_raw(face)), self.origin);
             let at = self.first_leaf + leaf;
-            self.boxes[at] = self.boxes[at].union(SmallBox::of(&points, self.origin));
+            self.boxes[at] = self.boxes[at].union(own);
+            self.face_box[face as usize] = own;
         }
         for at in (0..self.first_leaf).rev() {
             self.boxes[at] = self.boxes[2 * at + 1].union(self.boxes[2 * at + 2]);
@@ -132,6 +140,7 @@ impl Collision {
         if at >= self.leaf_of.len() {
             self.leaf_of.resize(at + 1, NONE);
             self.next.resize(at + 1, NONE);
+            self.face_box.resize(at + 1, SmallBox::EMPTY);
         }
         if self.leaf_of[at] == NONE {
             let leaf = self.leaf_of[sibling.index()];
@@ -141,6 +150,7 @@ impl Collision {
             self.added += 1;
         }
         let own = SmallBox::of(&mesh.corner_points(face), self.origin);
+        self.face_box[at] = own;
         let mut node = self.first_leaf + self.leaf_of[at] as usize;
         while !self.boxes[node].contains(own) {
             self.boxes[node] = self.boxes[node].union(own);
@@ -149,6 +159,11 @@ impl Collision {
             }
             node = (node - 1) / 2;
         }
+    }
+
+    /// Tells of a face that is gone.
+    pub fn forget(&mut self, face: FaceId) {
+        self.face_box[face.index()] = SmallBox::EMPTY;
     }
 
     /// Builds the tree anew when too much has changed since it was built.
@@ -165,26 +180,25 @@ impl Collision {
                 return true;
             }
         }
-        let all = new.iter().fold(SmallBox::EMPTY, |all, p| all.union(SmallBox::of(p, self.origin)));
-        self.collect(mesh, all, old);
-        for &face in &self.near {
-            let other = mesh.corner_points(FaceId::from_raw(face));
-            let own = SmallBox::of(&other, self.origin);
-            if own.overlaps(all)
-                && new.iter().any(|&a| {
-                    SmallBox::of(&a, self.origin).overlaps(own)
-                        && !clearly_apart(a, other)
-                        && triangle_triangle(a, other).is_intersection()
-                })
-            {
-                return true;
-            }
-        }
-        false
+        self.new_boxes.clear();
+        self.new_boxes.extend(new.iter().map(|points| SmallBox::of(points, self.origin)));
+        let all = self.new_boxes.iter().fold(SmallBox::EMPTY, |all, &own| all.union(own));
+        self.collect(all, old);
+        self.near.iter().any(|&face| {
+            let own = self.face_box[face as usize];
+            let mut other = None;
+            new.iter().zip(&self.new_boxes).any(|(&a, &new_box)| {
+                if !new_box.overlaps(own) {
+                    return false;
+                }
+                let b = *other.get_or_insert_with(|| mesh.corner_points(FaceId::from_raw(face)));
+                !clearly_apart(a, b) && triangle_triangle(a, b).is_intersection()
+            })
+        })
     }
 
-    /// Gathers the live faces in leaves that meet `area`, without those in `old`.
-    fn collect(&mut self, mesh: &HalfedgeMesh, area: SmallBox, old: &[FaceId]) {
+    /// Gathers the faces whose boxes meet `area`, without those in `old`.
+    fn collect(&mut self, area: SmallBox, old: &[FaceId]) {
         self.near.clear();
         self.stack.clear();
         self.stack.push(0);
@@ -200,8 +214,7 @@ impl Collision {
             }
             let mut face = self.head[node - self.first_leaf];
             while face != NONE {
-                let id = FaceId::from_raw(face);
-                if mesh.face_is_live(id) && !old.contains(&id) {
+                if self.face_box[face as usize].overlaps(area) && !old.contains(&FaceId::from_raw(face)) {
                     self.near.push(face);
                 }
                 face = self.next[face as usize];

@@ -138,6 +138,15 @@ impl<'a> Editor<'a> {
         &self.limits
     }
 
+    /// The certified bound of the two-sided distance to the reference: `tolerance`, or `None` where the input was
+    /// further away somewhere and still is, or where the tolerance is no distance.
+    pub fn certified_distance(&mut self, tolerance: f64) -> Option<f64> {
+        match &mut self.keeper {
+            Keeper::Distance { envelope, .. } => envelope.certifies(&self.mesh, tolerance).then_some(tolerance),
+            Keeper::QuadricSum { .. } | Keeper::QuadricRms { .. } => None,
+        }
+    }
+
     /// Ends the work.
     pub fn into_mesh(self) -> HalfedgeMesh {
         self.mesh
@@ -350,6 +359,9 @@ impl<'a> Editor<'a> {
             patch.ids.truncate(successors);
         }
         let sibling = patch.old[0];
+        for &f in patch.old.iter().filter(|&&f| !self.mesh.face_is_live(f)) {
+            self.collision.forget(f);
+        }
         for &f in &patch.ids {
             self.remember_shape(f);
             self.collision.update(&self.mesh, f, sibling);

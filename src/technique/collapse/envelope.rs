@@ -102,6 +102,16 @@ impl<'a> Envelope<'a> {
         self.uncovered
     }
 
+    /// Whether the whole surface and the whole reference lie within `tolerance` of each other, certified anew for the
+    /// surface's side; the reference's side is what the pieces stand for.
+    pub fn certifies(&mut self, mesh: &HalfedgeMesh, tolerance: f64) -> bool {
+        let kept = std::mem::replace(&mut self.reach, tolerance);
+        let faces: Vec<FaceId> = mesh.faces().collect();
+        let within = faces.into_iter().all(|f| self.is_within(&mesh.corner_points(f)));
+        self.reach = kept;
+        within && self.uncovered == 0
+    }
+
     /// The distance that edits keep.
     pub fn reach(&self) -> f64 {
         self.reach
