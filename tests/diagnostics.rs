@@ -18,8 +18,12 @@ fn check(path: &Path, overrides: &Overrides) -> Result<(), Diagnostics> {
     let exists = |path: &Path| {
         if root().join(path).is_file() { Ok(()) } else { Err("no such file".to_owned()) }
     };
-    let endings: Vec<&str> =
-        meshmill::format::Format::ALL.iter().flat_map(|format| format.endings()).copied().chain(METRIC_ENDINGS).collect();
+    let endings: Vec<&str> = meshmill::format::Format::ALL
+        .iter()
+        .flat_map(|format| format.endings())
+        .copied()
+        .chain(METRIC_ENDINGS)
+        .collect();
     let context = Context { catalog: CATALOG, check_file: &exists, endings: &endings };
     plan(&recipe, &context).map(drop)
 }

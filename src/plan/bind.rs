@@ -103,7 +103,8 @@ fn take_file(bound: &mut BoundDecl<'_>, input: &'static str, entry: &Entry, cont
         return;
     };
     if let Err(reason) = context.check_file(&path) {
-        let mut problem = Diagnostic::error(entry.value.span, format!("cannot read `{}`: {reason}", normalize(&path).display()));
+        let mut problem =
+            Diagnostic::error(entry.value.span, format!("cannot read `{}`: {reason}", normalize(&path).display()));
         let used = context.recipe.inputs.in_order().into_iter().find(|(_, input)| {
             matches!(entry.value.value, Node::File(_)) && context.recipe.file(&input.value).as_ref() == Some(&path)
         });
