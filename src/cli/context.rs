@@ -62,7 +62,7 @@ impl Planned {
 }
 
 /// The endings of files that can be written.
-fn endings() -> Vec<&'static str> {
+pub(super) fn endings() -> Vec<&'static str> {
     Format::ALL.iter().flat_map(|format| format.endings()).copied().collect()
 }
 

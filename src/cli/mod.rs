@@ -14,6 +14,7 @@ mod measure;
 mod plan;
 mod progress;
 mod run;
+mod schema;
 mod signals;
 mod steps;
 mod trace;
@@ -67,6 +68,7 @@ enum Command {
     Measure(measure::Arguments),
     Convert(convert::Arguments),
     Steps(steps::Arguments),
+    Schema(schema::Arguments),
     Cache(cache::Arguments),
     Completions(completions::Arguments),
 }
@@ -92,6 +94,7 @@ pub fn main() -> ExitCode {
         Command::Measure(command) => measure::run(command),
         Command::Convert(command) => convert::run(command),
         Command::Steps(command) => steps::run(command),
+        Command::Schema(command) => schema::run(command),
         Command::Cache(command) => cache::run(command, global),
         Command::Completions(command) => completions::run(command),
     });
