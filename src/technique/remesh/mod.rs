@@ -141,6 +141,13 @@ fn edges_by_length(editor: &Editor<'_>, f: FaceId) -> [EdgeId; 3] {
 /// Least and mean stretch that optimised coarsening asks of new stars, in falling steps.
 const COMFORT: [(f64, f64); 3] = [(0.7, 0.88), (0.6, 0.83), (0.5, 0.78)];
 
+/// Further steps for meshes that the first ones hardly coarsen, such as grids of right-angled triangles, where the first
+/// collapse always makes its star less even.
+const LESS_COMFORT: [(f64, f64); 2] = [(0.4, 0.65), (0.3, 0.5)];
+
+/// The part of the faces that must be gone for the further steps to be left out.
+const COARSENED: f64 = 0.25;
+
 /// Rounds of flips and relaxation between collapses, and at the end.
 const ROUNDS: [usize; 2] = [2, 8];
 
@@ -155,7 +162,11 @@ pub fn coarsen(
     watch: &Watch,
 ) -> Result<Ending, Cancelled> {
     let mut ending = Ending::Exhausted;
-    for (least, mean) in COMFORT {
+    let start = editor.mesh().face_count() as f64;
+    for (place, (least, mean)) in COMFORT.into_iter().chain(LESS_COMFORT).enumerate() {
+        if place >= COMFORT.len() && (editor.mesh().face_count() as f64) < (1.0 - COARSENED) * start {
+            break;
+        }
         let rules = CollapseRules { min_stretch: least.max(rules.min_stretch), mean_stretch: mean, ..*rules };
         ending = simplify(editor, &rules, target, watch)?;
         optimise(editor, ROUNDS[0], watch)?;

@@ -1,0 +1,283 @@
+//! Known answers and promises of the two simplification steps.
+
+use glam::{DVec3, dvec3};
+use meshmill::mesh::bvh::TriangleBvh;
+use meshmill::mesh::geometry::{Aabb, stretch};
+use meshmill::mesh::{
+    EdgeMark, Freedom, HalfedgeMesh, LockRules, MarkCause, Surface, VertexId, edge_key, resolve_freedom,
+};
+use meshmill::step::{Length, Sizing};
+use meshmill::steps::control_properties::{
+    ControlPropertiesInput, ControlPropertiesParams, ControlPropertiesStats, Status, control_properties,
+};
+use meshmill::steps::improve_quality::{ImproveQualityInput, ImproveQualityParams, improve_quality};
+use meshmill::technique::collapse::session::ToleranceMode;
+use meshmill::watch::Watch;
+
+fn surface(points: Vec<DVec3>, faces: &[[usize; 3]]) -> Surface {
+    Surface { points: points.into(), faces: faces.iter().map(|f| f.map(VertexId::new)).collect(), ..Surface::default() }
+}
+
+fn octahedron() -> Surface {
+    let points = vec![DVec3::X, DVec3::Y, DVec3::NEG_X, DVec3::NEG_Y, DVec3::Z, DVec3::NEG_Z];
+    let faces = [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4], [1, 0, 5], [2, 1, 5], [3, 2, 5], [0, 3, 5]];
+    surface(points, &faces)
+}
+
+fn tetrahedron() -> Surface {
+    let points = vec![dvec3(1.0, 1.0, 1.0), dvec3(-1.0, -1.0, 1.0), dvec3(-1.0, 1.0, -1.0), dvec3(1.0, -1.0, -1.0)];
+    surface(points, &[[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+}
+
+/// The octahedron, each face cut into four `times` times, pushed onto the unit sphere.
+fn sphere(times: u32) -> Surface {
+    let watch = Watch::silent();
+    let mut mesh = octahedron();
+    for _ in 0..times {
+        mesh = meshmill::technique::refine::subdivide(&mesh, 1, 1_000_000, &LockRules::default(), &watch).unwrap().0;
+        for p in &mut mesh.points {
+            *p = p.normalize();
+        }
+    }
+    mesh
+}
+
+/// A square of `n` by `n` cells of side 1.
+fn grid(n: usize) -> Surface {
+    let at = |i: usize, j: usize| j * (n + 1) + i;
+    let mut points = Vec::new();
+    let mut faces = Vec::new();
+    for j in 0..=n {
+        for i in 0..=n {
+            points.push(dvec3(i as f64, j as f64, 0.0));
+            if i < n && j < n {
+                faces.push([at(i, j), at(i + 1, j), at(i + 1, j + 1)]);
+                faces.push([at(i, j), at(i + 1, j + 1), at(i, j + 1)]);
+            }
+        }
+    }
+    surface(points, &faces)
+}
+
+/// The unit cube with `2^times` cells along each edge, its twelve edges marked and its corners pinned.
+fn cube(times: u32) -> Surface {
+    let points = (0..8).map(|i| dvec3(f64::from(i & 1), f64::from((i >> 1) & 1), f64::from(i >> 2))).collect();
+    let faces = [
+        [0, 2, 3],
+        [0, 3, 1],
+        [4, 5, 7],
+        [4, 7, 6],
+        [0, 1, 5],
+        [0, 5, 4],
+        [2, 6, 7],
+        [2, 7, 3],
+        [0, 4, 6],
+        [0, 6, 2],
+        [1, 3, 7],
+        [1, 7, 5],
+    ];
+    let mut cube = surface(points, &faces);
+    let mark = EdgeMark { freedom: Freedom::OnCurve, cause: MarkCause::Feature };
+    for i in 0..8_usize {
+        cube.carried.pin(VertexId::new(i), Freedom::Keep);
+        for bit in [1, 2, 4] {
+            if i & bit == 0 {
+                cube.carried.mark(edge_key(VertexId::new(i), VertexId::new(i | bit)), mark);
+            }
+        }
+    }
+    let (cube, _) =
+        meshmill::technique::refine::subdivide(&cube, times, 1_000_000, &LockRules::default(), &Watch::silent())
+            .unwrap();
+    cube
+}
+
+fn control(mesh: &Surface, params: &ControlPropertiesParams) -> (Surface, ControlPropertiesStats) {
+    let input = ControlPropertiesInput { surface: mesh, reference: mesh, locks: LockRules::default() };
+    control_properties(input, params, &Watch::silent()).expect("the parameters fit")
+}
+
+fn tolerance(length: f64) -> ControlPropertiesParams {
+    ControlPropertiesParams { tolerance: Length::Absolute(length), ..ControlPropertiesParams::default() }
+}
+
+/// The largest distance of dense samples of `from` to `to`.
+fn sampled_distance(from: &Surface, to: &Surface) -> f64 {
+    let tree = TriangleBvh::of_surface(to);
+    let steps = 12;
+    let mut largest = 0.0_f64;
+    for f in from.faces.ids() {
+        let [a, b, c] = from.corners(f);
+        for i in 0..=steps {
+            for j in 0..=steps - i {
+                let (u, v) = (f64::from(i) / f64::from(steps), f64::from(j) / f64::from(steps));
+                let p = a + u * (b - a) + v * (c - a);
+                largest = largest.max(tree.closest(p).map_or(f64::INFINITY, |c| c.distance()));
+            }
+        }
+    }
+    largest
+}
+
+fn euler(mesh: &Surface) -> i64 {
+    let freedom = resolve_freedom(mesh, &LockRules::default()).expect("no locks");
+    HalfedgeMesh::new(mesh, &freedom).expect("a 2-manifold").euler_characteristic()
+}
+
+fn least_stretch(mesh: &Surface) -> f64 {
+    mesh.faces.ids().map(|f| stretch(mesh.corners(f))).fold(1.0, f64::min)
+}
+
+#[test]
+fn a_tetrahedron_has_nothing_to_collapse() {
+    let (result, stats) = control(&tetrahedron(), &tolerance(10.0));
+    assert_eq!(stats.collapses, 0);
+    assert_eq!(result.faces.len(), 4);
+}
+
+#[test]
+fn an_octahedron_never_loses_its_topology() {
+    for mode in [ToleranceMode::QuadricRms, ToleranceMode::Distance] {
+        let params = ControlPropertiesParams { min_stretch: 0.0, tolerance_mode: mode, ..tolerance(10.0) };
+        let (result, _) = control(&octahedron(), &params);
+        assert_eq!(euler(&result), 2);
+        assert!(result.faces.len() >= 4);
+    }
+}
+
+#[test]
+fn a_flat_grid_keeps_its_outline_and_its_plane() {
+    let params = ControlPropertiesParams { optimize: Some(false), ..tolerance(0.1) };
+    let (result, stats) = control(&grid(16), &params);
+    assert!(result.faces.len() < 512 / 4, "{} faces are left", result.faces.len());
+    let area: f64 = result.faces.ids().map(|f| meshmill::mesh::geometry::triangle_area(result.corners(f))).sum();
+    assert!((area - 256.0).abs() < 1e-9, "the area is {area}");
+    assert!(result.points.iter().all(|p| p.z.abs() < 1e-12));
+    assert_eq!(stats.faces_violating, 0);
+    assert_eq!(stats.distance_bound, Some(0.1));
+}
+
+#[test]
+fn a_flat_grid_is_coarsened_with_optimisation_too() {
+    let (result, stats) = control(&grid(16), &tolerance(0.1));
+    assert!(result.faces.len() < 512 / 2, "{} faces are left", result.faces.len());
+    assert!(stats.min_stretch >= 0.3 && stats.mean_stretch >= 0.6, "{stats:?}");
+}
+
+#[test]
+fn a_cube_keeps_its_creases_exactly() {
+    let mesh = cube(4);
+    let params = ControlPropertiesParams { optimize: Some(false), ..tolerance(0.01) };
+    let (result, stats) = control(&mesh, &params);
+    assert!(result.faces.len() < mesh.faces.len() / 4, "{} faces are left", result.faces.len());
+    assert!(stats.min_stretch >= 0.2);
+    assert!(sampled_distance(&mesh, &result).max(sampled_distance(&result, &mesh)) < 1e-12);
+    for key in result.carried.marks.keys() {
+        let ends = key.map(|v| result.points[v]);
+        let fixed = (0..3).filter(|&axis| ends.iter().all(|p| p[axis].abs() < 1e-12 || (p[axis] - 1.0).abs() < 1e-12));
+        assert!(fixed.count() >= 2, "a marked edge {ends:?} left its crease");
+    }
+}
+
+#[test]
+fn a_sphere_stays_within_the_tolerance_both_ways() {
+    let mesh = sphere(4);
+    for part in [0.002, 0.01, 0.03] {
+        let (result, stats) = control(&mesh, &tolerance(part));
+        let distance = sampled_distance(&mesh, &result).max(sampled_distance(&result, &mesh));
+        assert!(distance <= part, "{distance} is beyond {part}");
+        assert_eq!(stats.distance_bound, Some(part));
+        assert_eq!(euler(&result), 2);
+        assert!(least_stretch(&result) >= 0.2);
+    }
+}
+
+#[test]
+fn thresholds_hold_on_the_result() {
+    let params = ControlPropertiesParams {
+        max_size: Some(Sizing::Uniform(Length::Absolute(0.4))),
+        max_valence: 8,
+        min_stretch: 0.4,
+        ..tolerance(0.05)
+    };
+    let (result, stats) = control(&sphere(4), &params);
+    assert_eq!(stats.status, Status::Satisfied);
+    assert!(stats.max_size <= 0.4 && stats.max_valence <= 8 && least_stretch(&result) >= 0.4);
+}
+
+#[test]
+fn the_target_is_reached_in_every_mode() {
+    for (mode, length) in
+        [(ToleranceMode::QuadricSum, 10.0), (ToleranceMode::QuadricRms, 0.5), (ToleranceMode::Distance, 0.05)]
+    {
+        let params = ControlPropertiesParams { target_faces: Some(500), tolerance_mode: mode, ..tolerance(length) };
+        let (result, stats) = control(&sphere(4), &params);
+        assert_eq!(stats.status, Status::TargetReached, "{mode:?}");
+        assert!(result.faces.len() <= 500 && least_stretch(&result) >= 0.2);
+    }
+}
+
+#[test]
+fn equal_input_gives_equal_output() {
+    let mesh = sphere(3);
+    assert_eq!(control(&mesh, &tolerance(0.02)).0, control(&mesh, &tolerance(0.02)).0);
+}
+
+#[test]
+fn scale_and_place_do_not_matter() {
+    let mesh = sphere(3);
+    let faces = |scale: f64, offset: DVec3| {
+        let mut other = mesh.clone();
+        for p in &mut other.points {
+            *p = scale * *p + offset;
+        }
+        let (result, stats) = control(&other, &tolerance(0.02 * scale));
+        assert_eq!(stats.distance_bound, Some(0.02 * scale));
+        result.faces.len() as f64
+    };
+    let here = faces(1.0, DVec3::ZERO);
+    for there in [faces(1e6, DVec3::ZERO), faces(1e-6, DVec3::ZERO), faces(1.0, DVec3::splat(1e6))] {
+        assert!((there / here - 1.0).abs() < 0.1, "{there} faces instead of {here}");
+    }
+}
+
+#[test]
+fn needles_become_good_triangles() {
+    // A cylinder's wall as a tessellation has it: long needles, here bent into a half pipe.
+    let (around, length) = (24, 40.0);
+    let mut points = Vec::new();
+    let mut faces = Vec::new();
+    for i in 0..=around {
+        let (sin, cos) = libm::sincos(std::f64::consts::PI * f64::from(i) / f64::from(around));
+        points.extend([dvec3(5.0 * cos, 5.0 * sin, 0.0), dvec3(5.0 * cos, 5.0 * sin, length)]);
+        let a = 2 * i as usize;
+        if i < around {
+            faces.extend([[a, a + 2, a + 3], [a, a + 3, a + 1]]);
+        }
+    }
+    let mesh = surface(points, &faces);
+    let diagonal = Aabb::of(mesh.points.iter().copied()).diagonal();
+    let params = ImproveQualityParams {
+        max_edge: Some(Sizing::Uniform(Length::Percent(5.0))),
+        ..ImproveQualityParams::default()
+    };
+    let input = ImproveQualityInput { surface: &mesh, reference: &mesh, locks: LockRules::default() };
+    let (result, stats) = improve_quality(input, &params, &Watch::silent()).expect("the parameters fit");
+    assert!(stats.min_stretch_before < 0.06);
+    assert!(stats.min_stretch >= 0.2 && stats.mean_stretch >= 0.75, "{stats:?}");
+    assert!(stats.max_size <= 0.05 * diagonal * 1.0001);
+    assert_eq!(stats.distance_bound, Some(0.002 * diagonal));
+    assert_eq!(euler(&result), 1);
+}
+
+#[test]
+fn a_percent_is_no_squared_length() {
+    let mesh = octahedron();
+    let params = ControlPropertiesParams {
+        tolerance_mode: ToleranceMode::QuadricSum,
+        tolerance: Length::Percent(1.0),
+        ..ControlPropertiesParams::default()
+    };
+    let input = ControlPropertiesInput { surface: &mesh, reference: &mesh, locks: LockRules::default() };
+    assert!(control_properties(input, &params, &Watch::silent()).is_err());
+}
