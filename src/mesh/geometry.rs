@@ -8,7 +8,8 @@
 //! with h/w and not with its square. Triangles without area are treated exactly as their edges.
 //!
 //! # Source
-//! Stretch: Date, Nagai, Hirose, Ohta. Property control of finite-element surface meshes, JCISE 2005, section 2.
+//! Stretch: H. Date, S. Kanai, T. Kishinami, I. Nishigaki, T. Dohi. High-Quality and Property Controlled Finite Element
+//! Mesh Generation From Triangular Meshes using the Multiresolution Technique. JCISE 5(4), 2005, section 3.3.
 
 use glam::DVec3;
 

@@ -1,15 +1,25 @@
 //! Simplifies a surface under thresholds for error, shape, size and valence.
 //!
-//! Date, Nagai, Hirose, Ohta: High-Quality and Property Controlled Finite Element Mesh Generation From Triangular Meshes
-//! Using the Multiresolution Technique, JCISE 2005, section 5; Date et al., CAD & Applications 2005, section 4.
+//! # Algorithm
 //! Phase A changes only what breaks the stretch threshold, until nothing does. Phase B collapses the edges that keep
 //! all thresholds C1 to C4, smallest and best first. With `optimize`, rounds of flips, splits and relaxation go in
 //! between, under the same tests.
 //!
-//! Invariants: topology, marked curves, kept elements; no new self-intersection; no threshold that holds somewhere is
-//! broken there. In `distance` mode the surface stays within the tolerance of the reference, both ways, at every moment.
-//! Cost: O(F log F); `distance` costs several times `quadric-rms`.
-//! Departures: the collapse engine lists them (`technique::collapse`). The thresholds need not hold on the input.
+//! Based on: H. Date, S. Kanai, T. Kishinami, I. Nishigaki, T. Dohi. High-Quality and Property Controlled Finite Element
+//! Mesh Generation From Triangular Meshes using the Multiresolution Technique. JCISE 5(4), 2005, section 5.
+//! Based on: H. Date, S. Kanai, T. Kishinami, I. Nishigaki. Mesh Simplification and Adaptive LOD for Finite Element Mesh
+//! Generation, 2005, section 4.
+//!
+//! # Invariants
+//! - Topology, marked curves and kept elements stay; no new self-intersection.
+//! - No threshold that holds somewhere is broken there.
+//! - In `distance` mode the surface stays within the tolerance of the reference, both ways, at every moment.
+//!
+//! # Cost
+//! O(F log F); `distance` costs several times `quadric-rms`.
+//!
+//! # Departures
+//! The collapse engine lists them (`technique::collapse`). The thresholds need not hold on the input.
 
 use std::sync::Arc;
 

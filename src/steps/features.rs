@@ -1,9 +1,18 @@
 //! Marks sharp edges, rims, borders and corners, which later steps keep.
 //!
-//! The angle between face normals with hysteresis; see [`feature`](crate::technique::feature) for algorithm, source,
-//! the rule for short chains and the trap of coarse cylinders.
+//! # Algorithm
+//! The angle between face normals with hysteresis; see [`feature`](crate::technique::feature) for the rule for short
+//! chains and the trap of coarse cylinders.
 //!
-//! Invariants: points and faces stay; a second run changes nothing. Cost: O(F log F).
+//! Based on: J. Canny. A computational approach to edge detection. IEEE Transactions on Pattern Analysis and Machine
+//! Intelligence 8(6), 1986, for the hysteresis.
+//!
+//! # Invariants
+//! - Points and faces stay as they are.
+//! - Idempotent: a second run changes nothing.
+//!
+//! # Cost
+//! O(F log F).
 
 use std::sync::Arc;
 

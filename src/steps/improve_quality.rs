@@ -1,16 +1,23 @@
 //! Improves element quality by refining and collapsing.
 //!
-//! Date, Nagai, Hirose, Ohta: High-Quality and Property Controlled Finite Element Mesh Generation From Triangular Meshes
-//! Using the Multiresolution Technique, JCISE 2005, section 4. Selective subdivision first, until no edge is longer than
-//! `max-edge`: the freedom that collapse needs. Then the collapse that improves its star most, relative to its size,
-//! again and again while the tolerance allows.
+//! # Algorithm
+//! Selective subdivision first, until no edge is longer than `max-edge`: the freedom that collapse needs. Then the
+//! collapse that improves its star most, relative to its size, again and again while the tolerance allows.
 //!
-//! Invariants: topology, marked curves, kept elements; no new self-intersection. In `distance` mode the surface stays
-//! within the tolerance of the reference, both ways, at every moment. No collapse leaves a face below a stretch of 0.2
-//! where its star had none.
-//! Cost: O(F log F) in the faces after refinement; a needle of length `l` gives at least `l / max-edge` of them.
-//! Departures: without `target-faces` the result keeps `max-edge`, since nothing else would stop on flat parts; the
-//! floor of 0.2; with `optimize`, flips and relaxation in between.
+//! Based on: H. Date, S. Kanai, T. Kishinami, I. Nishigaki, T. Dohi. High-Quality and Property Controlled Finite Element
+//! Mesh Generation From Triangular Meshes using the Multiresolution Technique. JCISE 5(4), 2005, section 4.
+//!
+//! # Invariants
+//! - Topology, marked curves and kept elements stay; no new self-intersection.
+//! - In `distance` mode the surface stays within the tolerance of the reference, both ways, at every moment.
+//! - No collapse leaves a face below a stretch of 0.2 where its star had none.
+//!
+//! # Cost
+//! O(F log F) in the faces after refinement; a needle of length `l` gives at least `l / max-edge` of them.
+//!
+//! # Departures
+//! Without `target-faces` the result keeps `max-edge`, since nothing else would stop on flat parts; the floor of 0.2;
+//! with `optimize`, flips and relaxation in between.
 
 use std::sync::Arc;
 

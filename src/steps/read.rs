@@ -5,7 +5,14 @@
 //! coordinates are identical, polygons with more than four corners are cut into triangles, and faces with fewer than
 //! three corners are left out. Groups, regions and fields of the file are kept.
 //!
-//! Invariants: coordinates are finite, corners are in range. Cost: linear in the file.
+//! Folklore; each format's own source stands in `format`.
+//!
+//! # Invariants
+//! - Coordinates are finite, corners are in range.
+//! - The same bytes give the same mesh.
+//!
+//! # Cost
+//! Linear in the file.
 
 use std::sync::Arc;
 

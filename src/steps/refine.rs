@@ -1,12 +1,19 @@
 //! Halves edges until none is longer than a limit.
 //!
-//! H. Date, S. Kanai, T. Kishinami, I. Nishigaki and T. Dohi, *High-quality and property controlled finite element mesh
-//! generation from triangular meshes using the multiresolution technique*, Journal of Computing and Information
-//! Science in Engineering, 2005, section 4.1. The work is done by [`refine`](crate::technique::refine).
+//! # Algorithm
+//! Midpoints of all edges that are too long, and the faces between them cut to match, in rounds; the work is done by
+//! [`refine`](crate::technique::refine).
 //!
-//! Invariants: shape, area, volume, Euler characteristic; no edge of the result is longer than its limit, except kept
-//! edges and the few that they force, which the statistics count. Cost: linear in the faces made, times the logarithm
-//! of the longest edge over the limit.
+//! Based on: H. Date, S. Kanai, T. Kishinami, I. Nishigaki, T. Dohi. High-Quality and Property Controlled Finite Element
+//! Mesh Generation From Triangular Meshes using the Multiresolution Technique. JCISE 5(4), 2005, section 4.1.
+//!
+//! # Invariants
+//! - Shape, area, volume and Euler characteristic stay.
+//! - No edge of the result is longer than its limit, except kept edges and the few that they force, which the
+//!   statistics count.
+//!
+//! # Cost
+//! Linear in the faces made, times the logarithm of the longest edge over the limit.
 
 use std::sync::Arc;
 

@@ -4,8 +4,14 @@
 //! included. Selectors by face (`normal`, `region`) take faces, and the edges and vertices of such faces. The selector
 //! `boundary-loop` takes the vertices and edges of rims, and the faces with an edge there.
 //!
-//! Invariants: the mesh stays as it is but for the new group, whose members are sorted. Cost: linear in the mesh, and
-//! O(n log n) where edges or rims are asked for.
+//! Folklore; no single source.
+//!
+//! # Invariants
+//! - The mesh stays as it is but for the new group.
+//! - The members of the group are sorted, without repeats.
+//!
+//! # Cost
+//! Linear in the mesh; O(n log n) where edges or rims are asked for.
 
 mod selector;
 #[cfg(test)]

@@ -1,11 +1,18 @@
 //! Cuts every face into four similar ones.
 //!
-//! H. Date, S. Kanai, T. Kishinami, I. Nishigaki and T. Dohi, *High-quality and property controlled finite element mesh
-//! generation from triangular meshes using the multiresolution technique*, Journal of Computing and Information
-//! Science in Engineering, 2005, section 5.1. The work is done by [`refine`](crate::technique::refine).
+//! # Algorithm
+//! All edges are halved, and each face becomes the one between its midpoints and three at its corners; the work is done
+//! by [`refine`](crate::technique::refine).
 //!
-//! Invariants: shape, area, volume, Euler characteristic; without kept edges the number of faces is four times the old
-//! one a round, stretch and angles stay, sizes halve. Cost: linear in the faces made.
+//! Based on: H. Date, S. Kanai, T. Kishinami, I. Nishigaki, T. Dohi. High-Quality and Property Controlled Finite Element
+//! Mesh Generation From Triangular Meshes using the Multiresolution Technique. JCISE 5(4), 2005, section 5.1.
+//!
+//! # Invariants
+//! - Shape, area, volume and Euler characteristic stay.
+//! - Without kept edges each round makes four times as many faces; stretch and angles stay, sizes halve.
+//!
+//! # Cost
+//! Linear in the faces made.
 
 use std::sync::Arc;
 

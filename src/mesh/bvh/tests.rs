@@ -1,3 +1,5 @@
+//! Queries of the tree against a search through all triangles, and the ties.
+
 use std::ops::ControlFlow;
 
 use glam::{DVec3, dvec3};

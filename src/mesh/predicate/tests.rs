@@ -1,3 +1,5 @@
+//! Signs and meetings of triangles: by hand, against a test of all edges, in any order of corners.
+
 use glam::{DVec3, dvec2, dvec3};
 use proptest::prelude::*;
 

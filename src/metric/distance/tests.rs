@@ -1,3 +1,5 @@
+//! Distances known by hand, decisions on both sides of a threshold, and bounds that dense samples never exceed.
+
 use glam::{DVec3, dvec3};
 use proptest::prelude::*;
 

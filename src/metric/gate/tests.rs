@@ -1,3 +1,5 @@
+//! Verdicts, excused faces, limits in percent and against a reference, on a mesh with one needle.
+
 use glam::{DVec3, dvec3};
 
 use super::*;

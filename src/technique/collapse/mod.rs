@@ -1,9 +1,11 @@
 //! Edge collapse with exchangeable placement, validity and priority: the simplification behind quality improvement and
 //! property control.
 //!
-//! Date, Nagai, Hirose, Ohta: High-Quality and Property Controlled Finite Element Mesh Generation From Triangular Meshes
-//! Using the Multiresolution Technique, JCISE 2005, figure 7: positions, valid edges, priorities, collapse, until the
-//! target is reached or no edge is valid.
+//! The loop of figure 7 of the paper: positions, valid edges, priorities, collapse, until the target is reached or no
+//! edge is valid.
+//!
+//! Based on: H. Date, S. Kanai, T. Kishinami, I. Nishigaki, T. Dohi. High-Quality and Property Controlled Finite Element
+//! Mesh Generation From Triangular Meshes using the Multiresolution Technique. JCISE 5(4), 2005, section 5.
 //!
 //! Invariants: every accepted collapse keeps thresholds ([`limits`]), tolerance ([`keeper`]), topology and freedom
 //! ([`crate::mesh::edit`]) and makes no new self-intersection ([`collision`]). Equal input gives equal output: ties go
