@@ -63,10 +63,12 @@ fn text() -> WriteOptions<'static> {
 }
 
 #[test]
-fn vtu_brings_everything_back() {
+fn vtu_and_vtk_bring_everything_back() {
     let soup = rich_sample();
-    for options in [binary(), text()] {
-        assert_eq!(read(Format::Vtu, &write(Format::Vtu, &soup, &options)), Ok(soup.clone()));
+    for options in [binary(), text(), WriteOptions { element: Some(Element::S8R), ..binary() }] {
+        for format in [Format::Vtu, Format::Vtk] {
+            assert_eq!(read(format, &write(format, &soup, &options)), Ok(soup.clone()), "{format:?} {options:?}");
+        }
     }
 }
 
@@ -135,7 +137,8 @@ proptest! {
         let options = if raw { binary() } else { text() };
         let bytes = write(Format::Vtu, &soup, &options);
         prop_assert_eq!(&bytes, &write(Format::Vtu, &soup, &options));
-        prop_assert_eq!(read(Format::Vtu, &bytes), Ok(soup));
+        prop_assert_eq!(read(Format::Vtu, &bytes), Ok(soup.clone()));
+        prop_assert_eq!(read(Format::Vtk, &write(Format::Vtk, &soup, &options)), Ok(soup));
     }
 
     #[test]
@@ -176,4 +179,4 @@ proptest! {
 }
 
 /// The formats that this file tests.
-const FORMATS: &[Format] = &[Format::Vtu, Format::Inp, Format::Msh, Format::Msh22];
+const FORMATS: &[Format] = &[Format::Vtu, Format::Inp, Format::Msh, Format::Msh22, Format::Vtk];

@@ -11,6 +11,7 @@ mod element;
 mod error;
 mod group_text;
 mod inp;
+mod mixed;
 mod msh;
 mod obj;
 mod off;
@@ -54,6 +55,8 @@ pub enum Format {
     Msh22,
     /// Nastran bulk data.
     Bdf,
+    /// Legacy VTK.
+    Vtk,
 }
 
 /// What a format is and does; one beside each reader and writer.
@@ -142,8 +145,18 @@ impl std::fmt::Debug for WriteOptions<'_> {
 
 impl Format {
     /// All formats.
-    pub const ALL: &'static [Self] =
-        &[Self::Stl, Self::Obj, Self::Ply, Self::Off, Self::Vtu, Self::Inp, Self::Msh, Self::Msh22, Self::Bdf];
+    pub const ALL: &'static [Self] = &[
+        Self::Stl,
+        Self::Obj,
+        Self::Ply,
+        Self::Off,
+        Self::Vtu,
+        Self::Inp,
+        Self::Msh,
+        Self::Msh22,
+        Self::Bdf,
+        Self::Vtk,
+    ];
 
     fn def(self) -> &'static FormatDef {
         match self {
@@ -156,6 +169,7 @@ impl Format {
             Self::Msh => &msh::DEF,
             Self::Msh22 => &msh::DEF_22,
             Self::Bdf => &bdf::DEF,
+            Self::Vtk => &vtk::DEF,
         }
     }
 

@@ -17,7 +17,6 @@
 //!
 //! Linear in the size of the file.
 
-mod input;
 mod read;
 mod v2;
 mod v4;

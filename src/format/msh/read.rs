@@ -9,7 +9,7 @@ use super::super::ReadCounts;
 use super::super::binary::ByteOrder;
 use super::super::element::{Elements, Placed, Shape};
 use super::super::error::{FormatError, Place, Reason};
-use super::input::Input;
+use super::super::mixed::Input;
 use super::{element_type, is_quad, v2, v4};
 use crate::mesh::{EdgeKey, FaceId, Field, Soup, Support, VertexId};
 use crate::watch::Watch;

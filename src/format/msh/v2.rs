@@ -6,8 +6,8 @@ use smallvec::SmallVec;
 
 use super::super::element::Placed;
 use super::super::error::{FormatError, Place, Reason};
+use super::super::mixed::Input;
 use super::element_type;
-use super::input::Input;
 use super::read::Model;
 
 /// `$Nodes` or `$ParametricNodes`.

@@ -3,8 +3,8 @@
 use smallvec::SmallVec;
 
 use super::super::error::FormatError;
+use super::super::mixed::Input;
 use super::element_type;
-use super::input::Input;
 use super::read::Model;
 use super::v2::{point, unknown};
 

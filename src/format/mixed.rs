@@ -1,11 +1,11 @@
-//! Words and numbers of a Gmsh file, which is text with sections that may be binary.
+//! Words and numbers of files that are text with sections that may be binary: Gmsh and legacy VTK.
 
-use super::super::binary::{ByteOrder, ByteReader, finite};
-use super::super::error::{FormatError, Place, Reason};
-use super::super::text::{claim, parse_integer, parse_number};
+use super::binary::{ByteOrder, ByteReader, finite};
+use super::error::{FormatError, Place, Reason};
+use super::text::{claim, parse_integer, parse_number};
 
 /// Walks over the file.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Input<'a> {
     bytes: &'a [u8],
     at: usize,
@@ -58,22 +58,37 @@ impl<'a> Input<'a> {
 
     /// A name in quotes; text without quotes is taken to the end of the line.
     pub(super) fn quoted(&mut self) -> String {
-        let rest = &self.bytes[self.at..];
-        let line = &rest[..rest.iter().position(|&b| b == b'\n').unwrap_or(rest.len())];
-        self.at += line.len();
-        let name = line.trim_ascii();
+        let name = self.rest_of_line();
         let inner = name.strip_prefix(b"\"").map(|n| n.strip_suffix(b"\"").unwrap_or(n));
         String::from_utf8_lossy(inner.unwrap_or(name)).into_owned()
     }
 
-    /// Ends a line of text, so that binary data may follow.
+    /// Ends a line of text, so that binary data may follow: blanks belong to the line only when it ends after them.
     pub(super) fn end_line(&mut self) {
+        let blanks = self.bytes[self.at..].iter().take_while(|&&b| matches!(b, b' ' | b'\t')).count();
+        if !matches!(self.bytes.get(self.at + blanks), Some(b'\r' | b'\n')) {
+            return;
+        }
+        self.at += blanks;
         for end in [b'\r', b'\n'] {
             if self.bytes.get(self.at) == Some(&end) {
                 self.at += 1;
                 self.line += u64::from(end == b'\n');
             }
         }
+    }
+
+    /// The rest of the line without blanks round it.
+    pub(super) fn rest_of_line(&mut self) -> &'a [u8] {
+        let rest = &self.bytes[self.at..];
+        let line = &rest[..rest.iter().position(|&b| b == b'\n').unwrap_or(rest.len())];
+        self.at += line.len();
+        line.trim_ascii()
+    }
+
+    /// The next `count` bytes of binary data.
+    pub(super) fn take(&mut self, count: usize, within: &'static str) -> Result<&'a [u8], FormatError> {
+        self.binary(ByteOrder::Big, |r| r.take(count, within))
     }
 
     /// Goes behind `mark`; `false` when it does not come.
