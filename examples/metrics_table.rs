@@ -43,7 +43,7 @@ fn line(argument: &str, weld: bool) -> Result<serde_json::Value, Box<dyn Error>>
     Ok(out.into())
 }
 
-fn main() -> Result<(), Box<dyn Error>> {
+fn main() {
     let mut arguments: Vec<String> = std::env::args().skip(1).collect();
     let weld = arguments.iter().any(|a| a == "--weld");
     arguments.retain(|a| a != "--weld");
@@ -53,5 +53,4 @@ fn main() -> Result<(), Box<dyn Error>> {
             Err(error) => println!("{}", serde_json::json!({ "file": argument, "error": error.to_string() })),
         }
     }
-    Ok(())
 }

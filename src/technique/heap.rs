@@ -158,9 +158,12 @@ mod tests {
             let mut heap = IndexedHeap::with_items(8);
             let mut map = BTreeMap::new();
             for (item, priority) in changes {
-                match priority {
-                    Some(p) => { heap.set(item, f32::from(p)); map.insert(item, p); }
-                    None => { heap.remove(item); map.remove(&item); }
+                if let Some(p) = priority {
+                    heap.set(item, f32::from(p));
+                    map.insert(item, p);
+                } else {
+                    heap.remove(item);
+                    map.remove(&item);
                 }
                 prop_assert_eq!(heap.len(), map.len());
             }

@@ -35,16 +35,9 @@ fn decoded(word: &[u8]) -> String {
     let mut at = 0;
     while at < word.len() {
         let digits = word.get(at + 1..at + 3).and_then(|d| std::str::from_utf8(d).ok());
-        match digits.and_then(|d| u8::from_str_radix(d, 16).ok()).filter(|_| word[at] == b'%') {
-            Some(byte) => {
-                bytes.push(byte);
-                at += 3;
-            }
-            None => {
-                bytes.push(word[at]);
-                at += 1;
-            }
-        }
+        let escaped = digits.and_then(|d| u8::from_str_radix(d, 16).ok()).filter(|_| word[at] == b'%');
+        bytes.push(escaped.unwrap_or(word[at]));
+        at += if escaped.is_some() { 3 } else { 1 };
     }
     String::from_utf8_lossy(&bytes).into_owned()
 }

@@ -237,12 +237,11 @@ impl Reader<'_> {
                     Reason::Unsupported(format!("an array of type {kind}")),
                 ));
             }
-            match self.on {
-                Some(on) => self.array(on, name, &kind, rows, components)?,
-                None => {
-                    let values = self.numbers(&kind, rows as i64, components)?;
-                    self.set.field_arrays.push(Array { name, components: components.max(1), values });
-                }
+            if let Some(on) = self.on {
+                self.array(on, name, &kind, rows, components)?;
+            } else {
+                let values = self.numbers(&kind, rows as i64, components)?;
+                self.set.field_arrays.push(Array { name, components: components.max(1), values });
             }
         }
         Ok(())
