@@ -1,30 +1,39 @@
 //! Marks sharp edges, rims, borders and corners, which later steps keep.
 //!
 //! # Algorithm
-//! The angle between face normals with hysteresis; see [`feature`](crate::technique::feature) for the rule for short
-//! chains and the trap of coarse cylinders.
+//! The angle between face normals with hysteresis, of the plain normals or of those that vote tensors have freed of
+//! noise; see [`feature`](crate::technique::feature) for the rule for short chains and the trap of coarse cylinders.
 //!
 //! Based on: J. Canny. A computational approach to edge detection. IEEE Transactions on Pattern Analysis and Machine
-//! Intelligence 8(6), 1986, for the hysteresis.
+//! Intelligence 8(6), 1986, for the hysteresis; D. L. Page, Y. Sun, A. F. Koschan, J. Paik, M. A. Abidi. Normal vector
+//! voting: crease detection and curvature estimation on large, noisy meshes. Graphical Models 64, 2002, for the votes.
 //!
 //! # Invariants
 //! - Points and faces stay as they are.
 //! - Idempotent: a second run changes nothing.
 //!
 //! # Cost
-//! O(F log F).
+//! O(F log F); with votes or curvatures O(F · faces in reach), in parallel.
 
 use std::sync::Arc;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::mesh::Surface;
+use crate::mesh::geometry::Aabb;
+use crate::mesh::{Field, Support, Surface};
 use crate::step::{
-    Angle, Artifact, InputDef, Inputs, Locks, OutPort, OutputDef, Port, Produced, Step as StepContract, StepFailure,
+    Angle, Artifact, InputDef, Inputs, Length, Locks, OutPort, OutputDef, Port, Produced, Step as StepContract,
+    StepFailure,
 };
+use crate::technique::curvature::{mean_edge, principal_curvatures};
 use crate::technique::feature::{FeatureRules, Report, mark_features};
-use crate::watch::Watch;
+use crate::watch::{Cancelled, Watch};
+
+/// How far votes reach by default, in mean edges.
+const VOTING_EDGES: f64 = 5.0;
+/// The radius of the balls that curvatures are averaged over, in mean edges.
+const CURVATURE_EDGES: f64 = 2.5;
 
 /// Marks the edges and corners that give a part its shape, so that later steps keep them.
 ///
@@ -43,12 +52,40 @@ pub struct FeaturesParams {
     pub region_borders: bool,
     /// A curve that turns by more than this angle has a corner, which later steps keep exactly. Degrees, default 45.
     pub corner_angle: Angle,
+    /// How sharp edges are found: `"dihedral"` (default), or `"normal-voting"` for scans.
+    pub method: FeatureMethod,
+    /// How far votes reach along the surface with `normal-voting`. Length; default 5 mean edges. Sharp edges closer to
+    /// each other than this melt into one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub radius: Option<Length>,
+    /// Whether the principal curvatures go along as vertex fields `curvature-max` and `curvature-min`, in 1/length and
+    /// positive where convex; `max` is the larger magnitude. Averaged over balls of 2.5 mean edges. Default false.
+    pub curvature: bool,
 }
 
 impl Default for FeaturesParams {
     fn default() -> Self {
-        Self { angle: Angle(30.0), seed_angle: None, region_borders: true, corner_angle: Angle(45.0) }
+        Self {
+            angle: Angle(30.0),
+            seed_angle: None,
+            region_borders: true,
+            corner_angle: Angle(45.0),
+            method: FeatureMethod::Dihedral,
+            radius: None,
+            curvature: false,
+        }
     }
+}
+
+/// How sharp edges are found.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum FeatureMethod {
+    /// By the angle between the normals of two faces: for CAD tessellations and clean meshes.
+    #[default]
+    Dihedral,
+    /// By the votes of the normals in a neighbourhood: for scans and other noisy, evenly meshed surfaces.
+    NormalVoting,
 }
 
 /// What was marked.
@@ -78,17 +115,71 @@ pub struct FeaturesStats {
     pub angle_is_doubtful: bool,
 }
 
+/// Why no features were marked.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum FeaturesError {
+    /// Votes need a neighbourhood.
+    #[error("`radius` must be positive, got {0}")]
+    BadRadius(f64),
+    /// The run was interrupted.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+}
+
+impl From<FeaturesError> for StepFailure {
+    fn from(error: FeaturesError) -> Self {
+        match error {
+            FeaturesError::Cancelled(cancelled) => cancelled.into(),
+            FeaturesError::BadRadius(_) => {
+                Self::failed(error.to_string()).with_help("leave `radius` out for 5 mean edges")
+            }
+        }
+    }
+}
+
 /// Marks the features of `surface`.
-pub fn features(surface: &Surface, params: &FeaturesParams) -> (Surface, FeaturesStats) {
+///
+/// # Errors
+/// See [`FeaturesError`].
+pub fn features(
+    surface: &Surface,
+    params: &FeaturesParams,
+    watch: &Watch,
+) -> Result<(Surface, FeaturesStats), FeaturesError> {
     let angle = params.angle.0;
     let rules = FeatureRules {
         angle,
         seed_angle: params.seed_angle.map_or((angle + 10.0).min(180.0), |seed| seed.0),
         corner_angle: params.corner_angle.0,
         region_borders: params.region_borders,
+        voting_radius: voting_radius(surface, params)?,
     };
-    let (marked, report) = mark_features(surface, &rules);
-    (marked, stats(&report, angle))
+    watch.phase("marking features", None);
+    let (mut marked, report) = mark_features(surface, &rules, watch)?;
+    if params.curvature {
+        watch.phase("curvature", None);
+        store_curvature(&mut marked, watch)?;
+    }
+    Ok((marked, stats(&report, angle)))
+}
+
+fn voting_radius(surface: &Surface, params: &FeaturesParams) -> Result<Option<f64>, FeaturesError> {
+    if params.method == FeatureMethod::Dihedral {
+        return Ok(None);
+    }
+    let diagonal = Aabb::of(surface.points.iter().copied()).diagonal();
+    let radius = params.radius.map_or_else(|| VOTING_EDGES * mean_edge(surface), |length| length.resolve(diagonal));
+    if radius > 0.0 { Ok(Some(radius)) } else { Err(FeaturesError::BadRadius(radius)) }
+}
+
+/// Adds the principal curvatures as vertex fields.
+fn store_curvature(surface: &mut Surface, watch: &Watch) -> Result<(), Cancelled> {
+    let radius = CURVATURE_EDGES * mean_edge(surface);
+    let all = principal_curvatures(surface, radius, watch)?;
+    let field = |name: &str, values| Field { name: name.to_owned(), support: Support::Vertex, components: 1, values };
+    surface.carried.set_field(field("curvature-max", all.iter().map(|p| p.max.0).collect()));
+    surface.carried.set_field(field("curvature-min", all.iter().map(|p| p.min.0).collect()));
+    Ok(())
 }
 
 fn stats(report: &Report, angle: f64) -> FeaturesStats {
@@ -112,7 +203,7 @@ pub struct Step;
 
 impl StepContract for Step {
     const NAME: &'static str = "features";
-    const REVISION: u32 = 1;
+    const REVISION: u32 = 2;
     const INPUTS: &'static [InputDef] =
         &[InputDef { name: "from", accepts: &[Port::Surface], required: true, doc: "the surface to mark" }];
     const OUTPUTS: &'static [OutputDef] = &[OutputDef { name: "main", port: OutPort::Is(Port::Surface) }];
@@ -130,9 +221,8 @@ impl StepContract for Step {
         watch: &Watch,
     ) -> Result<Produced<FeaturesStats>, StepFailure> {
         let surface = inputs.surface("from")?;
-        watch.phase("marking features", None);
         watch.check()?;
-        let (marked, stats) = features(surface, params);
+        let (marked, stats) = features(surface, params, watch)?;
         Ok(Produced { artifact: Artifact::Surface(Arc::new(marked)), stats })
     }
 }

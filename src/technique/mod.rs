@@ -10,3 +10,4 @@ pub mod hierarchy;
 pub mod quadric;
 pub mod refine;
 pub mod remesh;
+pub mod triangulate_loop;

@@ -12,7 +12,6 @@ use rustc_hash::FxHashSet;
 use super::adjacency::{EdgeTable, NONE, Twins, face_of, fan, head, next, tail};
 use super::cut;
 use super::draft::{Draft, Origin, normal};
-use super::fill::Loop;
 use super::params::FillHoles;
 use super::patch::{Patch, Surroundings, fair, refine};
 use super::report::{LISTED, LoopFate, LoopStats, RepairStats};
@@ -20,6 +19,7 @@ use crate::mesh::bvh::{Primitive, TriangleBvh};
 use crate::mesh::id::Vertex;
 use crate::mesh::predicate::triangle_triangle;
 use crate::mesh::{EdgeKey, HalfedgeId, IdVec, VertexId, edge_key};
+use crate::technique::triangulate_loop::Loop;
 use crate::watch::{Cancelled, Watch};
 
 /// A fill with a bend beyond this (1 - cosine, so 170 degrees) folds back.

@@ -33,7 +33,6 @@ mod cut;
 mod degenerate;
 mod draft;
 mod duplicate;
-mod fill;
 mod holes;
 mod intersect;
 mod non_manifold;

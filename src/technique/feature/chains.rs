@@ -13,19 +13,19 @@ const GROWTH_TURN: f64 = 30.0;
 const LEAST_CHAIN: f64 = 0.005;
 
 /// The edges at each vertex, for some of the edges.
-struct Incidence {
+pub(super) struct Incidence {
     offsets: Vec<u32>,
     items: Vec<EdgeId>,
 }
 
 impl Incidence {
-    fn at(&self, v: VertexId) -> &[EdgeId] {
+    pub(super) fn at(&self, v: VertexId) -> &[EdgeId] {
         &self.items[self.offsets[v.index()] as usize..self.offsets[v.index() + 1] as usize]
     }
 }
 
 impl Curves<'_> {
-    fn incidence(&self, chosen: impl Fn(EdgeId) -> bool) -> Incidence {
+    pub(super) fn incidence(&self, chosen: impl Fn(EdgeId) -> bool) -> Incidence {
         let edges = || self.edges.keys().ids().filter(|&e| chosen(e));
         let mut offsets = vec![0_u32; self.surface.points.len() + 1];
         for v in edges().flat_map(|e| self.edges.key(e)) {
@@ -45,12 +45,12 @@ impl Curves<'_> {
         Incidence { offsets, items }
     }
 
-    fn other_end(&self, e: EdgeId, v: VertexId) -> VertexId {
+    pub(super) fn other_end(&self, e: EdgeId, v: VertexId) -> VertexId {
         let [a, b] = self.edges.key(e);
         if a == v { b } else { a }
     }
 
-    fn length(&self, e: EdgeId) -> f64 {
+    pub(super) fn length(&self, e: EdgeId) -> f64 {
         let [a, b] = self.edges.key(e);
         self.surface.points[a].distance(self.surface.points[b])
     }

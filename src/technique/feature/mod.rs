@@ -9,21 +9,28 @@
 //! Rims are always curves; so are borders of regions and face groups where asked for. A corner is a vertex where the
 //! number of curve edges is not 2, or where the curve turns by more than `corner_angle`.
 //!
+//! With [`FeatureRules::voting_radius`] the angles are those between normals that the vote tensors of the
+//! neighbourhood have freed of noise; see `voting`. Corners are then turns over an arm of half that radius, because the
+//! edges of a scan zigzag along a crease, and connected sets of edges shorter than the radius are dropped.
+//!
 //! Invariants: every corner ends a curve, no curve passes a corner; a second run on the result changes nothing.
 //! Faces without a reliable normal, being lower than a millionth of the diagonal, take that of the neighbour over
 //! their longest side. Trap: a cylinder of `n` facets has edges of 360°/n; [`Report::facet_angle`] tells the usual
 //! angle between facets, and `angle` should be more than 1.5 times that. Cost: O(F log F).
 
 mod chains;
+mod corners;
 mod sharpness;
 #[cfg(test)]
 mod tests;
+mod voting;
 
 use std::collections::BTreeSet;
 
 use crate::mesh::id::Edge;
 use crate::mesh::topology::EdgeTable;
 use crate::mesh::{EdgeMark, FaceId, Freedom, IdVec, MarkCause, Surface, VertexId};
+use crate::watch::{Cancelled, Watch};
 
 /// What is sharp. All angles in degrees.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,6 +43,8 @@ pub struct FeatureRules {
     pub corner_angle: f64,
     /// Whether borders between regions and between face groups are curves.
     pub region_borders: bool,
+    /// The geodesic radius of normal voting; without it the plain angles between faces count.
+    pub voting_radius: Option<f64>,
 }
 
 /// What was found.
@@ -74,11 +83,14 @@ struct Curves<'a> {
 /// Marks sharp edges, rims and borders, and pins corners; marks of an earlier run are replaced.
 ///
 /// Marks of seams and locks stay, and so do pins away from the marks replaced.
-pub fn mark_features(surface: &Surface, rules: &FeatureRules) -> (Surface, Report) {
+///
+/// # Errors
+/// The run was interrupted.
+pub fn mark_features(surface: &Surface, rules: &FeatureRules, watch: &Watch) -> Result<(Surface, Report), Cancelled> {
     let mut result = surface.clone();
     forget(&mut result);
     let (marks, corners, report) = {
-        let mut curves = Curves::new(&result);
+        let mut curves = Curves::new(&result, rules, watch)?;
         let mut report = Report { facet_angle: curves.facet_angle(rules), ..Report::default() };
         curves.mark_rims(&mut report);
         report.grown_edges = curves.mark_sharp(rules);
@@ -86,7 +98,13 @@ pub fn mark_features(surface: &Surface, rules: &FeatureRules) -> (Surface, Repor
             curves.mark_borders(&mut report);
         }
         report.dropped_chains = curves.drop_short_chains(rules);
-        let corners = curves.corners(rules.corner_angle);
+        let corners = match rules.voting_radius {
+            None => curves.corners(rules.corner_angle),
+            Some(radius) => {
+                report.dropped_chains += curves.drop_islands(radius);
+                curves.corners_by_arm(rules.corner_angle, 0.5 * radius)
+            }
+        };
         curves.count(&corners, &mut report);
         (curves.marks(), corners, report)
     };
@@ -96,7 +114,7 @@ pub fn mark_features(surface: &Surface, rules: &FeatureRules) -> (Surface, Repor
     for corner in corners {
         result.carried.pin(corner, Freedom::Keep);
     }
-    (result, report)
+    Ok((result, report))
 }
 
 fn is_ours(cause: MarkCause) -> bool {
@@ -116,11 +134,16 @@ fn forget(surface: &mut Surface) {
 }
 
 impl<'a> Curves<'a> {
-    fn new(surface: &'a Surface) -> Self {
+    fn new(surface: &'a Surface, rules: &FeatureRules, watch: &Watch) -> Result<Self, Cancelled> {
         let edges = EdgeTable::new(surface);
-        let angles = sharpness::angles(surface, &edges);
+        let raw = sharpness::normals(surface, &edges);
+        let normals = match rules.voting_radius {
+            None => raw,
+            Some(radius) => voting::normals(surface, &edges, raw, radius, watch)?,
+        };
+        let angles = sharpness::angles(&edges, &normals);
         let causes = edges.keys().iter().map(|key| surface.carried.marks.get(key).map(|m| m.cause)).collect();
-        Self { surface, edges, angles, causes }
+        Ok(Self { surface, edges, angles, causes })
     }
 
     fn facet_angle(&self, rules: &FeatureRules) -> Option<f64> {

@@ -12,8 +12,7 @@ use crate::mesh::{EdgeId, FaceId, IdVec, Surface};
 const LEAST_HEIGHT: f64 = 1e-6;
 
 /// The angle between the normals at each edge in degrees; 0 on rims.
-pub(super) fn angles(surface: &Surface, edges: &EdgeTable) -> IdVec<Edge, f64> {
-    let normals = normals(surface, edges);
+pub(super) fn angles(edges: &EdgeTable, normals: &IdVec<Face, DVec3>) -> IdVec<Edge, f64> {
     let at = |e: EdgeId| match edges.sides(e) {
         [a, b] => angle(normals[a.face], normals[b.face]).to_degrees(),
         _ => 0.0,
@@ -22,7 +21,7 @@ pub(super) fn angles(surface: &Surface, edges: &EdgeTable) -> IdVec<Edge, f64> {
 }
 
 /// The normals of the faces; a face without a reliable one takes that of its neighbour over its longest side.
-fn normals(surface: &Surface, edges: &EdgeTable) -> IdVec<Face, DVec3> {
+pub(super) fn normals(surface: &Surface, edges: &EdgeTable) -> IdVec<Face, DVec3> {
     let least = LEAST_HEIGHT * Aabb::of(surface.points.iter().copied()).diagonal();
     let own = |f: FaceId| {
         let corners = surface.corners(f);

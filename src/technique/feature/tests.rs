@@ -4,7 +4,12 @@ use super::*;
 use crate::mesh::halfedge::tests::surface;
 use crate::mesh::{MarkCause, Regions};
 
-const RULES: FeatureRules = FeatureRules { angle: 30.0, seed_angle: 40.0, corner_angle: 45.0, region_borders: true };
+const RULES: FeatureRules =
+    FeatureRules { angle: 30.0, seed_angle: 40.0, corner_angle: 45.0, region_borders: true, voting_radius: None };
+
+fn find(surface: &Surface, rules: &FeatureRules) -> (Surface, Report) {
+    mark_features(surface, rules, &Watch::silent()).expect("nobody interrupts")
+}
 
 fn cube() -> Surface {
     let points: Vec<[f64; 3]> =
@@ -32,7 +37,7 @@ fn cylinder(n: u32) -> Surface {
 
 #[test]
 fn a_cube_has_twelve_edges_and_eight_corners() {
-    let (marked, report) = mark_features(&cube(), &RULES);
+    let (marked, report) = find(&cube(), &RULES);
     assert_eq!((report.sharp_edges, report.curves, report.corners), (12, 12, 8));
     assert_eq!(report.length, 12.0);
     assert_eq!((marked.carried.marks.len(), marked.carried.pins.len()), (12, 8));
@@ -42,8 +47,8 @@ fn a_cube_has_twelve_edges_and_eight_corners() {
 #[test]
 fn a_second_run_changes_nothing() {
     for mesh in [cube(), cylinder(16), cylinder(10)] {
-        let (once, first) = mark_features(&mesh, &RULES);
-        let (twice, second) = mark_features(&once, &RULES);
+        let (once, first) = find(&mesh, &RULES);
+        let (twice, second) = find(&once, &RULES);
         assert_eq!((&once, &first), (&twice, &second));
     }
 }
@@ -51,10 +56,10 @@ fn a_second_run_changes_nothing() {
 #[test]
 fn a_cylinder_has_two_rims_only() {
     for n in [16, 32, 64, 256] {
-        let (_, report) = mark_features(&cylinder(n), &RULES);
+        let (_, report) = find(&cylinder(n), &RULES);
         assert_eq!((report.sharp_edges, report.curves, report.corners), (2 * n as usize, 2, 0), "n = {n}");
     }
-    let (_, report) = mark_features(&cylinder(16), &RULES);
+    let (_, report) = find(&cylinder(16), &RULES);
     assert_eq!(report.facet_angle, Some(22.5));
 }
 
@@ -63,11 +68,11 @@ fn rims_and_region_borders_are_curves() {
     let points = [[0.0; 3], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
     let mut square = surface(&points, &[[0, 1, 2], [0, 2, 3]]);
     square.carried.regions = Some(Regions { labels: vec![0, 1].into(), names: vec!["a".into(), "b".into()] });
-    let (marked, report) = mark_features(&square, &RULES);
+    let (marked, report) = find(&square, &RULES);
     assert_eq!((report.rim_edges, report.border_edges, report.sharp_edges, report.corners), (4, 1, 0, 4));
     let diagonal = marked.carried.marks[&[VertexId::new(0), VertexId::new(2)]];
     assert_eq!((diagonal.cause, diagonal.freedom), (MarkCause::RegionBorder, Freedom::OnCurve));
-    let (_, report) = mark_features(&square, &FeatureRules { region_borders: false, ..RULES });
+    let (_, report) = find(&square, &FeatureRules { region_borders: false, ..RULES });
     assert_eq!((report.border_edges, report.curves), (0, 4));
 }
 
@@ -76,6 +81,6 @@ fn a_short_loose_chain_is_dropped() {
     // A square with one slightly lifted vertex near its middle: four weak creases, all below the seed angle.
     let points = [[0.0; 3], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0], [0.5, 0.5, 0.22]];
     let mesh = surface(&points, &[[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]]);
-    let (_, report) = mark_features(&mesh, &RULES);
+    let (_, report) = find(&mesh, &RULES);
     assert_eq!((report.sharp_edges, report.rim_edges), (0, 4));
 }

@@ -9,26 +9,26 @@ use std::collections::BTreeSet;
 use glam::DVec3;
 
 /// Corners up to which the best triangulation is found; its time grows with the cube.
-pub(super) const LARGEST_EXACT: usize = 500;
+pub const LARGEST_EXACT: usize = 500;
 
 /// A loop to fill. It runs the way the faces beside it run.
-pub(super) struct Loop<'a> {
+pub struct Loop<'a> {
     /// Its corners.
-    pub(super) points: &'a [DVec3],
+    pub points: &'a [DVec3],
     /// The normal of the face beside each edge; edge `i` begins at corner `i`.
-    pub(super) normals: &'a [DVec3],
+    pub normals: &'a [DVec3],
     /// Whether an edge between two corners that are not neighbours is free.
-    pub(super) is_free: &'a dyn Fn(usize, usize) -> bool,
+    pub is_free: &'a dyn Fn(usize, usize) -> bool,
 }
 
 /// Triangles over the corners of a loop.
-pub(super) struct Triangulation {
+pub struct Triangulation {
     /// Corners of each triangle, which continue the orientation of the faces beside the loop.
-    pub(super) triangles: Vec<[usize; 3]>,
+    pub triangles: Vec<[usize; 3]>,
     /// The largest bend at any edge: 1 minus the cosine of the angle between the normals, so 0 is flat and 2 folded.
-    pub(super) bend: f64,
+    pub bend: f64,
     /// The largest bend at the loop itself.
-    pub(super) rim_bend: f64,
+    pub rim_bend: f64,
 }
 
 /// The bend of a triangle without area: worse than folded, but better than no triangulation.
@@ -47,7 +47,7 @@ impl Loop<'_> {
     }
 
     /// The best triangulation found, or `None` when every one needs an edge that is not free.
-    pub(super) fn triangulate(&self) -> Option<Triangulation> {
+    pub fn triangulate(&self) -> Option<Triangulation> {
         let triangles = if self.points.len() <= LARGEST_EXACT { self.best() } else { self.ears() }?;
         Some(self.describe(triangles))
     }
