@@ -1,0 +1,143 @@
+//! The shipped pipelines, run as a newcomer runs them: golden metrics and gates, and files that read back sound.
+
+#[path = "common/snapshot.rs"]
+mod snapshot;
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use meshmill::format::{Format, read};
+use meshmill::mesh::Soup;
+use meshmill::metric::{self, Value};
+use meshmill::watch::Watch;
+use serde_json::{Map, json};
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+fn pipelines() -> Vec<PathBuf> {
+    let entries = fs::read_dir(root().join("pipelines")).expect("the folder of pipelines");
+    let files = entries.map(|entry| entry.expect("an entry").path());
+    let mut recipes: Vec<_> = files.filter(|file| file.extension().is_some_and(|ending| ending == "toml")).collect();
+    recipes.sort();
+    recipes
+}
+
+/// A run in a folder of its own: the JSON document on stdout, and the files in `out`.
+struct Run {
+    folder: tempfile::TempDir,
+    report: serde_json::Value,
+}
+
+impl Run {
+    /// Runs a recipe with its own parameters, on its own part or on `part`; it must exit with 0.
+    fn of(recipe: &Path, part: Option<&Path>) -> Self {
+        let folder = tempfile::tempdir().expect("a folder");
+        let mut command = assert_cmd::Command::new(assert_cmd::cargo::cargo_bin!("meshmill"));
+        command.current_dir(folder.path()).env("MESHMILL_CACHE", folder.path().join("cache"));
+        command.arg("run").arg(recipe).args(["--json", "--out", "out"]);
+        if let Some(part) = part {
+            command.arg("--input").arg(format!("part={}", part.display()));
+        }
+        let done = command.assert().success();
+        let report = serde_json::from_slice(&done.get_output().stdout).expect("one JSON document");
+        Self { folder, report }
+    }
+
+    /// Steps with their size and quality, tables of `measure`, and the gates: what does not depend on place or time.
+    fn golden(&self) -> serde_json::Value {
+        let case = &self.report["cases"][0];
+        let steps = case["steps"].as_array().expect("steps").iter().map(|step| {
+            let figures = step["figures"].as_object().cloned().unwrap_or_default();
+            (step["name"].as_str().expect("a name").to_owned(), figures.into())
+        });
+        let gates = case["gates"].as_array().expect("gates").iter().map(|gate| {
+            let rows = gate["rows"].as_array().expect("rows").iter();
+            let rows =
+                rows.map(|row| json!([row["metric"], row["limit"], row["measured"], row["passed"], row["note"]]));
+            (gate["step"].as_str().expect("a step").to_owned(), rows.collect())
+        });
+        json!({ "steps": steps.collect::<Map<_, _>>(), "gates": gates.collect::<Map<_, _>>() })
+    }
+
+    /// The files that it wrote, read back.
+    fn meshes(&self) -> Vec<(String, Soup)> {
+        let files = self.report["cases"][0]["files"].as_array().expect("files");
+        let read_back = files.iter().map(|file| {
+            let path = self.folder.path().join(file["path"].as_str().expect("a path"));
+            let name = path.file_name().expect("a name").to_string_lossy().into_owned();
+            let bytes = fs::read(&path).unwrap_or_else(|error| panic!("{name}: {error}"));
+            let format = Format::detect(&name, &bytes).expect("a known format");
+            let mesh = read(format, &bytes, &Watch::silent()).unwrap_or_else(|error| panic!("{name}: {error}")).0;
+            (name, mesh)
+        });
+        read_back.collect()
+    }
+}
+
+fn holds(mesh: &Soup, name: &str) -> bool {
+    let table = metric::measure(mesh, None, &Watch::silent()).expect("not cancelled");
+    table.get(name) == Some(Value::Flag(true))
+}
+
+#[test]
+fn shipped_pipelines_give_the_golden_metrics_and_sound_files() {
+    for recipe in pipelines() {
+        let name = recipe.file_stem().expect("a name").to_string_lossy().into_owned();
+        let run = Run::of(&recipe, None);
+        snapshot::assert_golden("pipelines", &name, &run.golden());
+        let meshes = run.meshes();
+        assert!(meshes.iter().any(|(file, _)| file == "result.vtu"), "{name} writes no result.vtu");
+        for (file, mesh) in &meshes {
+            for property in ["closed", "manifold", "oriented"] {
+                assert!(holds(mesh, property), "{name}: {file} is not {property}");
+            }
+        }
+        let sizes: BTreeSet<_> = meshes.iter().map(|(_, mesh)| (mesh.points.len(), mesh.faces.len())).collect();
+        assert_eq!(sizes.len(), 1, "{name}: the files differ in size: {sizes:?}");
+    }
+}
+
+/// Edges as pairs of vertices with the number of faces there.
+fn edges(mesh: &Soup) -> Vec<([usize; 2], usize)> {
+    let sides = mesh.faces.iter().flat_map(|face| {
+        let corners = face.corners();
+        let ends = corners.iter().zip(corners.iter().cycle().skip(1));
+        ends.map(|(a, b)| [a.min(b).index(), a.max(b).index()]).collect::<Vec<_>>()
+    });
+    let mut sides: Vec<_> = sides.collect();
+    sides.sort_unstable();
+    sides.chunk_by(|a, b| a == b).map(|same| (same[0], same.len())).collect()
+}
+
+#[test]
+fn a_joint_of_three_plates_is_conforming_when_written() {
+    let part = root().join("examples/meshes/t_joint.obj");
+    let run = Run::of(&root().join("pipelines/fe-surface.toml"), Some(&part));
+    let meshes = run.meshes();
+    assert_eq!(meshes.len(), 3);
+    for (file, mesh) in meshes {
+        // The plates meet on the line x = z = 0, 60 long.
+        let on_joint = |v: usize| {
+            let point = mesh.points.as_slice()[v];
+            point.x.abs() < 1e-4 && point.z.abs() < 1e-4
+        };
+        let (joint, others): (Vec<_>, Vec<_>) =
+            edges(&mesh).into_iter().partition(|([a, b], _)| on_joint(*a) && on_joint(*b));
+        let length: f64 =
+            joint.iter().map(|([a, b], _)| mesh.points.as_slice()[*a].distance(mesh.points.as_slice()[*b])).sum();
+        assert!(
+            joint.iter().all(|(_, faces)| *faces == 3),
+            "{file}: an edge of the joint has not three faces: {joint:?}"
+        );
+        assert!((length - 60.0).abs() < 1e-3, "{file}: the edges of the joint are {length} long");
+        let vertices = (0..mesh.points.len()).filter(|&v| on_joint(v)).count();
+        assert_eq!(vertices, joint.len() + 1, "{file}: a vertex hangs on the joint");
+        assert!(others.iter().all(|(_, faces)| *faces <= 2), "{file}: plates meet away from the joint");
+        let outer = others.iter().filter(|(_, faces)| *faces == 1);
+        let rim: f64 = outer.map(|([a, b], _)| mesh.points.as_slice()[*a].distance(mesh.points.as_slice()[*b])).sum();
+        assert!((rim - 460.0).abs() < 1e-2, "{file}: the rim is {rim} long and should be 460");
+    }
+}

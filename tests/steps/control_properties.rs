@@ -1,0 +1,66 @@
+//! Control-properties: thresholds hold when counted again, and what is kept stays.
+
+use meshmill::metric;
+use meshmill::watch::Watch;
+
+use super::golden::{golden, golden_of};
+use crate::shapes;
+use crate::step::{run, surface};
+
+const LIMITS: &str = "min-stretch = 0.3, max-size = \"20%\", max-valence = 9, tolerance = \"1%\"";
+
+#[test]
+fn the_thresholds_hold_when_counted_again() {
+    for (name, mesh) in [("sphere", shapes::sphere(4)), ("torus", shapes::torus(40, 20))] {
+        let from = surface(shapes::surface(&mesh));
+        let made = golden("control-properties", name, LIMITS, &from);
+        let (result, before) = (made.artifact.to_soup().unwrap(), from.to_soup().unwrap());
+        let measured = metric::measure(&result, Some(&before), &Watch::silent()).unwrap();
+        let number = |name: &str| measured.get(name).unwrap().as_f64();
+        assert!(result.faces.len() < before.faces.len() / 2, "{name}: {} faces", result.faces.len());
+        assert!(number("min-stretch") >= 0.3 && number("max-valence") <= 9.0, "{name}");
+        assert!(number("max-size") <= 0.2 * number("diagonal") && number("self-intersections") == 0.0, "{name}");
+        assert!(number("distance") - number("distance-slack") <= made.stats["tolerance"].as_f64().unwrap(), "{name}");
+        assert_eq!(number("euler-characteristic"), if name == "torus" { 0.0 } else { 2.0 });
+    }
+}
+
+#[test]
+fn kept_faces_are_identical_in_the_result() {
+    let mesh = surface(shapes::surface(&shapes::subdivided(&shapes::cube(), 3)));
+    let named = run("select", "name = \"top\", normal = { direction = [0, 0, 1] }", &mesh).artifact;
+    let marked = run("features", "", &named).artifact;
+    let made = golden_of("control-properties", "kept top", LIMITS, "keep = [\"top\"]", &[("from", marked.clone())]);
+    let corners = |artifact: &meshmill::step::Artifact| {
+        let mesh = artifact.as_surface().unwrap();
+        let mut faces: Vec<_> =
+            mesh.carried.groups.faces["top"].iter().map(|&f| mesh.corners(f).map(|p| p.to_array())).collect();
+        for face in &mut faces {
+            face.sort_by(|a, b| a.partial_cmp(b).unwrap());
+        }
+        faces.sort_by(|a, b| a.partial_cmp(b).unwrap());
+        faces
+    };
+    assert_eq!(corners(&made.artifact), corners(&marked));
+}
+
+#[test]
+fn by_quadrics_to_a_number_of_faces() {
+    let sphere = surface(shapes::surface(&shapes::sphere(4)));
+    let parameters = "tolerance-mode = \"quadric-sum\", tolerance = 0.01, min-stretch = 0.2, target-faces = 500";
+    let made = golden("control-properties", "sphere by quadrics", parameters, &sphere);
+    assert_eq!(made.stats["status"], "target-reached");
+}
+
+#[test]
+fn both_sheets_of_a_seam_change_alike() {
+    let joint = crate::step::soup(shapes::t_joint(16));
+    let seamed = run("repair", "non-manifold = \"seam\"", &joint).artifact;
+    let marked = run("features", "", &seamed).artifact;
+    let made = golden("control-properties", "t-joint", LIMITS, &marked);
+    let made = made.artifact.as_surface().unwrap();
+    for (vertex, seam) in &made.carried.seams {
+        let twins = made.carried.seams.iter().filter(|(v, s)| *s == seam && made.points[**v] == made.points[*vertex]);
+        assert_eq!(twins.count(), 2, "vertex {vertex} has lost its twin");
+    }
+}

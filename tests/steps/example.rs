@@ -1,0 +1,61 @@
+//! The snippet that the reference shows for each step runs as it stands.
+
+use std::fs;
+use std::path::Path;
+use std::sync::Arc;
+
+use meshmill::plan::{Context, plan};
+use meshmill::recipe::{Overrides, Recipe};
+use meshmill::run::{RunOptions, Silent, run};
+use meshmill::step::StepDef;
+use meshmill::steps::CATALOG;
+use meshmill::store::Store;
+
+use crate::shapes;
+
+/// What the snippets name.
+const BEFORE: &str = "[inputs]\npart = \"part.obj\"\n\
+    [steps.raw]\nuse = \"read\"\nfile = \"=inputs.part\"\n\
+    [steps.clean]\nuse = \"repair\"\nfrom = \"raw\"\n\
+    [steps.fe]\nuse = \"control-properties\"\nfrom = \"clean\"\n";
+
+/// A slender bar as an OBJ file: small steps in percent of its diagonal stay few.
+fn bar() -> String {
+    let mesh = shapes::cylinder(8, 1);
+    let points = mesh.points.iter().map(|p| format!("v {} {} {}\n", 0.05 * p.x, 0.05 * p.y, p.z));
+    let faces = shapes::faces(&mesh).into_iter().map(|[a, b, c]| format!("f {} {} {}\n", a + 1, b + 1, c + 1));
+    points.chain(faces).collect()
+}
+
+fn runs(step: &StepDef, folder: &Path) {
+    let text = format!("name = \"example\"\n{BEFORE}[steps.example]\n{}", step.example);
+    let load = |_: &Path| Ok(text.clone());
+    let recipe = Recipe::load(&folder.join("example.toml"), &load, &Overrides::default()).expect("a recipe");
+    let context = Context { catalog: CATALOG, check_file: &|_| Ok(()), endings: &[] };
+    let plan = plan(&recipe, &context).unwrap_or_else(|problems| panic!("{}: {}", step.name, problems.render(false)));
+    let options = RunOptions {
+        name: "example".to_owned(),
+        out: folder.join("out"),
+        jobs: 1,
+        only: vec!["example".to_owned()],
+        force: Vec::new(),
+        cancelled: Arc::default(),
+    };
+    let store = Store::open(&folder.join("cache")).expect("a store");
+    let observer: Arc<dyn meshmill::run::Observer> = Arc::new(Silent);
+    let outcome = run(&plan, &store, &options, &observer).expect("a run");
+    let failures: Vec<_> = outcome.failures(&plan).map(|(task, failure)| format!("{task}: {failure}")).collect();
+    assert!(failures.is_empty(), "the example of `{}` fails: {failures:?}", step.name);
+    let made = outcome.task(plan.cases()[0].steps["example"]).content;
+    assert!(made.is_some(), "the example of `{}` gives nothing", step.name);
+}
+
+#[test]
+fn every_example_runs() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("part.obj"), bar()).unwrap();
+    for step in CATALOG {
+        assert!(step.example.contains(&format!("use = \"{}\"", step.name)), "the example of `{}`", step.name);
+        runs(step, folder.path());
+    }
+}
