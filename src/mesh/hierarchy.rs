@@ -151,6 +151,13 @@ impl Hierarchy {
         if !self.curvature.is_empty() && self.curvature.len() != self.node_count() {
             return Some(format!("{} curvatures for {} nodes", self.curvature.len(), self.node_count()));
         }
+        if !self.element_size.iter().chain(self.curvature.iter()).all(|x| x.is_finite() && *x >= 0.0) {
+            return Some("an element size or curvature is negative or no number".to_owned());
+        }
+        let vanished: usize = self.merges.iter().map(|merge| usize::from(merge.faces)).sum();
+        if vanished > self.finest.faces.len() {
+            return Some(format!("{vanished} of {} faces vanish", self.finest.faces.len()));
+        }
         let mut has_parent = vec![false; self.node_count()];
         let mut start = 0;
         for (index, merge) in self.merges.iter().enumerate() {
@@ -164,7 +171,8 @@ impl Hierarchy {
             let Some(ring) = self.rings.get(start..end) else {
                 return Some(format!("the ring of node {node} ends at {end}, past the stored rings"));
             };
-            if ring.iter().any(|r| r.index() >= node) || !merge.point.is_finite() {
+            // A ring of nodes that were roots then is what makes forced operations end.
+            if ring.iter().any(|r| r.index() >= node || has_parent[r.index()]) || !merge.point.is_finite() {
                 return Some(format!("node {node} has a ring or point out of range"));
             }
             start = end;

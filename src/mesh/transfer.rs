@@ -38,6 +38,13 @@ pub fn transfer_fields(source: &Surface, tree: &TriangleBvh, target: &mut Surfac
     }
 }
 
+/// Gives `target` the fields of `source` where there are any, see [`transfer_fields`].
+pub fn inherit_fields(source: &Surface, target: &mut Surface) {
+    if !source.carried.fields.is_empty() {
+        transfer_fields(source, &TriangleBvh::of_surface(source), target);
+    }
+}
+
 fn vertex_values(source: &Surface, field: &Field, origins: &[Origin]) -> Vec<f64> {
     let n = field.components;
     let at = |v: VertexId, k: usize| field.values.get(n * v.index() + k).copied().unwrap_or(f64::NAN);

@@ -14,6 +14,10 @@ pub(super) fn figures(artifact: &Artifact) -> Figures {
         Artifact::Surface(surface) => {
             Figures { port, ..of_mesh(surface.points.len(), surface.faces.len(), &surface_stretches(surface)) }
         }
+        Artifact::Hierarchy(hierarchy) => {
+            let finest = &hierarchy.finest;
+            Figures { port, ..of_mesh(finest.points.len(), finest.faces.len(), &surface_stretches(finest)) }
+        }
         Artifact::Metrics(metrics) => Figures { port, metrics: Some((**metrics).clone()), ..Figures::default() },
     }
 }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 
 use super::failure::StepFailure;
-use crate::mesh::{Soup, Surface};
+use crate::mesh::{Hierarchy, Soup, Surface};
 use crate::metric::Measurement;
 
 /// The type of an input or output, checked before anything runs.
@@ -19,6 +19,8 @@ pub enum Port {
     Soup,
     /// An oriented 2-manifold triangle mesh, perhaps with boundary.
     Surface,
+    /// A surface with the record of the collapses that coarsen it.
+    Hierarchy,
     /// A table of metrics.
     Metrics,
 }
@@ -29,6 +31,7 @@ impl fmt::Display for Port {
             Self::File => "file",
             Self::Soup => "soup",
             Self::Surface => "surface",
+            Self::Hierarchy => "hierarchy",
             Self::Metrics => "metrics",
         })
     }
@@ -52,6 +55,8 @@ pub enum Artifact {
     Soup(Arc<Soup>),
     /// See [`Port::Surface`].
     Surface(Arc<Surface>),
+    /// See [`Port::Hierarchy`].
+    Hierarchy(Arc<Hierarchy>),
     /// See [`Port::Metrics`].
     Metrics(Arc<Measurement>),
 }
@@ -63,6 +68,7 @@ impl Artifact {
             Self::File(_) => Port::File,
             Self::Soup(_) => Port::Soup,
             Self::Surface(_) => Port::Surface,
+            Self::Hierarchy(_) => Port::Hierarchy,
             Self::Metrics(_) => Port::Metrics,
         }
     }
@@ -75,6 +81,14 @@ impl Artifact {
         }
     }
 
+    /// The hierarchy, or a failure that names the port found.
+    pub fn as_hierarchy(&self) -> Result<&Arc<Hierarchy>, StepFailure> {
+        match self {
+            Self::Hierarchy(hierarchy) => Ok(hierarchy),
+            other => Err(StepFailure::bad_input(format!("expected a hierarchy, got a {}", other.port()))),
+        }
+    }
+
     /// The soup, or a failure that names the port found.
     pub fn as_soup(&self) -> Result<&Arc<Soup>, StepFailure> {
         match self {
@@ -83,12 +97,12 @@ impl Artifact {
         }
     }
 
-    /// Any mesh as a soup, for writers and metrics; `None` for files and metrics.
+    /// Any mesh as a soup, for writers and metrics; `None` for files, hierarchies and metrics.
     pub fn to_soup(&self) -> Option<Arc<Soup>> {
         match self {
             Self::Soup(soup) => Some(Arc::clone(soup)),
             Self::Surface(surface) => Some(Arc::new(surface.to_soup())),
-            Self::File(_) | Self::Metrics(_) => None,
+            Self::File(_) | Self::Hierarchy(_) | Self::Metrics(_) => None,
         }
     }
 }

@@ -8,6 +8,7 @@ pub mod failure;
 pub mod length;
 pub mod locks;
 pub mod parameters;
+pub mod resolution;
 pub mod sizing;
 
 use std::sync::Arc;
@@ -20,6 +21,7 @@ pub use artifact::{Artifact, FileBytes, Port};
 pub use failure::{ElementRef, FailureKind, StepFailure};
 pub use length::{Angle, Length, Share, Sizing};
 pub use locks::{Boundary, Locks};
+pub use resolution::Resolution;
 pub use sizing::ResolvedSizing;
 
 use crate::watch::Watch;
@@ -80,6 +82,11 @@ impl Inputs {
     /// A required input that is a surface.
     pub fn surface(&self, name: &'static str) -> Result<&Arc<crate::mesh::Surface>, StepFailure> {
         self.require(name)?.as_surface()
+    }
+
+    /// A required input that is a hierarchy.
+    pub fn hierarchy(&self, name: &'static str) -> Result<&Arc<crate::mesh::Hierarchy>, StepFailure> {
+        self.require(name)?.as_hierarchy()
     }
 
     /// An optional input that is a surface.

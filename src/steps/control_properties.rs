@@ -10,6 +10,8 @@
 //! Based on: H. Date, S. Kanai, T. Kishinami, I. Nishigaki. Mesh Simplification and Adaptive LOD for Finite Element Mesh
 //! Generation, 2005, section 4.
 //!
+//! The output `hierarchy` is the record of pure collapse under the same thresholds, see [`crate::technique::hierarchy`].
+//!
 //! # Invariants
 //! - Topology, marked curves and kept elements stay; no new self-intersection.
 //! - No threshold that holds somewhere is broken there.
@@ -27,14 +29,16 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::mesh::halfedge::EnterError;
-use crate::mesh::{FreedomError, LockRules, Surface, resolve_freedom};
+use crate::mesh::transfer::inherit_fields;
+use crate::mesh::{FreedomError, Hierarchy, LockRules, Surface, resolve_freedom};
 use crate::step::{
     Artifact, InputDef, Inputs, Length, Locks, OutPort, OutputDef, Port, Produced, ResolvedSizing, Sizing, StepFailure,
 };
 use crate::technique::collapse::session::{
     Recount, Setup, ToleranceMode, Violation, diagonal, open, recount, reference_tree,
 };
-use crate::technique::collapse::{CollapseRules, Editor, Ending, Limits, Order, Priority, SizeField, simplify};
+use crate::technique::collapse::{CollapseRules, Counts, Editor, Ending, Limits, Order, Priority, SizeField, simplify};
+use crate::technique::hierarchy::{Front, HierarchyReport, Recorded, Source, build, extract};
 use crate::technique::remesh::{coarsen, raise_stretch};
 use crate::watch::{Cancelled, Watch};
 
@@ -146,6 +150,9 @@ pub struct ControlPropertiesStats {
     /// where the input was further away than the tolerance and could not be brought back.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub distance_bound: Option<f64>,
+    /// The finest end, where the output is the hierarchy; all other figures are then those of its coarsest front.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub hierarchy: Option<HierarchyReport>,
 }
 
 /// Why property control refused.
@@ -202,19 +209,61 @@ pub fn control_properties(
     let freedom = resolve_freedom(input.surface, &input.locks)?;
     let tree = reference_tree(params.tolerance_mode, input.reference);
     let setup = setup(&input, params, diagonal(input.reference))?;
-    let (tolerance, limits) = (setup.tolerance, setup.limits.clone());
-    let mut editor = open(input.surface, &freedom, input.reference, &tree, setup)?;
+    let mut editor = open(input.surface, &freedom, input.reference, &tree, setup.clone())?;
     let ending = run_phases(&mut editor, params, watch)?;
     let counts = editor.counts();
-    let distance_bound = editor.certified_distance(tolerance);
-    let left = editor.into_mesh().leave();
-    let freedom = resolve_freedom(&left.surface, &input.locks)?;
-    let recount = recount(&left.surface, &freedom, &limits);
-    let status = status(&recount, ending, params.target_faces.is_some());
-    let stats = ControlPropertiesStats {
-        status,
+    let distance_bound = editor.certified_distance(setup.tolerance);
+    let mut result = editor.into_mesh().leave().surface;
+    inherit_fields(input.surface, &mut result);
+    let stats = stats(&input, params, &setup, &result, End { ending, counts, distance_bound })?;
+    Ok((result, stats))
+}
+
+/// Mends and optimises `input.surface` as [`control_properties`] does before it simplifies, then records every collapse
+/// that keeps the thresholds. The statistics are those of the coarsest front.
+///
+/// # Errors
+/// As [`control_properties`].
+pub fn record_properties(
+    input: ControlPropertiesInput<'_>,
+    params: &ControlPropertiesParams,
+    watch: &Watch,
+) -> Result<(Hierarchy, ControlPropertiesStats), ControlPropertiesError> {
+    let tree = reference_tree(params.tolerance_mode, input.reference);
+    let setup = setup(&input, params, diagonal(input.reference))?;
+    let ControlPropertiesInput { surface, reference, locks } = input;
+    let source = Source { surface, reference, tree: &tree, locks };
+    let recorded: Recorded = build::<ControlPropertiesError>(source, &setup, &rules(params), optimises(params), watch)?;
+    let coarsest = extract(&Front::coarsest(&recorded.hierarchy));
+    let end = End { ending: Ending::Exhausted, counts: recorded.counts, distance_bound: recorded.distance_bound };
+    let unlimited = ControlPropertiesParams { target_faces: None, ..params.clone() };
+    let mut stats = stats(&input, &unlimited, &setup, &coarsest, end)?;
+    stats.hierarchy = Some(HierarchyReport::of(&recorded.hierarchy));
+    Ok((recorded.hierarchy, stats))
+}
+
+/// How the work ended.
+struct End {
+    ending: Ending,
+    counts: Counts,
+    distance_bound: Option<f64>,
+}
+
+/// Counts everything on the result.
+fn stats(
+    input: &ControlPropertiesInput<'_>,
+    params: &ControlPropertiesParams,
+    setup: &Setup,
+    result: &Surface,
+    end: End,
+) -> Result<ControlPropertiesStats, ControlPropertiesError> {
+    let freedom = resolve_freedom(result, &input.locks)?;
+    let recount = recount(result, &freedom, &setup.limits);
+    let counts = end.counts;
+    Ok(ControlPropertiesStats {
+        status: status(&recount, end.ending, params.target_faces.is_some()),
         faces_before: input.surface.faces.len(),
-        faces_after: left.surface.faces.len(),
+        faces_after: result.faces.len(),
         collapses: counts.collapses,
         flips: counts.flips,
         splits: counts.splits,
@@ -229,24 +278,32 @@ pub fn control_properties(
         faces_excused: recount.excused(),
         vertices_over_valence: recount.over_valence,
         violations: recount.violations.into_iter().take(64).collect(),
-        tolerance,
-        distance_bound,
-    };
-    Ok((left.surface, stats))
+        tolerance: setup.tolerance,
+        distance_bound: end.distance_bound,
+        hierarchy: None,
+    })
 }
 
-fn run_phases(editor: &mut Editor<'_>, params: &ControlPropertiesParams, watch: &Watch) -> Result<Ending, Cancelled> {
+fn rules(params: &ControlPropertiesParams) -> CollapseRules {
     let is_certified = params.tolerance_mode == ToleranceMode::Distance;
-    let rules = CollapseRules {
+    CollapseRules {
         min_stretch: params.min_stretch,
         mean_stretch: 0.0,
         must_improve: false,
         order: if is_certified { Order::OnSurface } else { Order::Printed },
         priority: Priority::SmallFirst { size: 1.0 },
-    };
+    }
+}
+
+fn optimises(params: &ControlPropertiesParams) -> bool {
+    params.optimize.unwrap_or(params.tolerance_mode == ToleranceMode::Distance)
+}
+
+fn run_phases(editor: &mut Editor<'_>, params: &ControlPropertiesParams, watch: &Watch) -> Result<Ending, Cancelled> {
+    let rules = rules(params);
     let target = params.target_faces.unwrap_or(0);
     raise_stretch(editor, params.min_stretch, &rules, watch)?;
-    if !params.optimize.unwrap_or(is_certified) {
+    if !optimises(params) {
         return simplify(editor, &rules, target, watch);
     }
     coarsen(editor, &rules, target, watch)
@@ -330,9 +387,13 @@ impl crate::step::Step for Step {
             doc: "what the tolerance is measured against; default: `from`",
         },
     ];
-    const OUTPUTS: &'static [OutputDef] = &[OutputDef { name: "main", port: OutPort::Is(Port::Surface) }];
+    const OUTPUTS: &'static [OutputDef] = &[
+        OutputDef { name: "main", port: OutPort::Is(Port::Surface) },
+        OutputDef { name: "hierarchy", port: OutPort::Is(Port::Hierarchy) },
+    ];
     const EDITS: bool = true;
-    const CARRIES: &'static str = "Maps groups, regions, marks, pins and seams; drops fields.";
+    const CARRIES: &'static str =
+        "Maps groups, regions, marks, pins and seams; takes fields from the nearest points of `from`.";
     const EXAMPLE: &'static str = "use = \"control-properties\"\nfrom = \"clean\"\nmin-stretch = 0.2\nmax-size = \"4%\"\nmax-valence = 10\ntolerance = \"0.2%\"\n";
 
     type Params = ControlPropertiesParams;
@@ -340,7 +401,7 @@ impl crate::step::Step for Step {
 
     fn run(
         inputs: &Inputs,
-        _output: &str,
+        output: &str,
         params: &ControlPropertiesParams,
         locks: &Locks,
         watch: &Watch,
@@ -348,6 +409,10 @@ impl crate::step::Step for Step {
         let surface = inputs.surface("from")?;
         let reference = inputs.surface_opt("reference")?.unwrap_or(surface);
         let input = ControlPropertiesInput { surface, reference, locks: locks.rules() };
+        if output == "hierarchy" {
+            let (hierarchy, stats) = record_properties(input, params, watch)?;
+            return Ok(Produced { artifact: Artifact::Hierarchy(Arc::new(hierarchy)), stats });
+        }
         let (surface, stats) = control_properties(input, params, watch)?;
         Ok(Produced { artifact: Artifact::Surface(Arc::new(surface)), stats })
     }

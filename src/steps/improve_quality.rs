@@ -25,12 +25,14 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::mesh::halfedge::EnterError;
-use crate::mesh::{FreedomError, IdVec, LockRules, Surface, resolve_freedom};
+use crate::mesh::transfer::inherit_fields;
+use crate::mesh::{FreedomError, Hierarchy, IdVec, LockRules, Surface, resolve_freedom};
 use crate::step::{
     Artifact, InputDef, Inputs, Length, Locks, OutPort, OutputDef, Port, Produced, ResolvedSizing, Sizing, StepFailure,
 };
 use crate::technique::collapse::session::{Setup, ToleranceMode, diagonal, open, recount, reference_tree};
-use crate::technique::collapse::{CollapseRules, Editor, Ending, Limits, Order, Priority, SizeField, simplify};
+use crate::technique::collapse::{CollapseRules, Counts, Editor, Ending, Limits, Order, Priority, SizeField, simplify};
+use crate::technique::hierarchy::{Front, HierarchyReport, Recorded, Source, build, extract};
 use crate::technique::refine::{MAX_FACES, MaxEdge, RefineError, refine};
 use crate::technique::remesh::coarsen;
 use crate::watch::{Cancelled, Watch};
@@ -128,6 +130,9 @@ pub struct ImproveQualityStats {
     /// where the input was further away than the tolerance and could not be brought back.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub distance_bound: Option<f64>,
+    /// The finest end, where the output is the hierarchy; all other figures are then those of its coarsest front.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub hierarchy: Option<HierarchyReport>,
 }
 
 /// Why quality improvement refused.
@@ -190,19 +195,72 @@ pub fn improve_quality(
     let surface = refined.as_ref().unwrap_or(input.surface);
     let freedom = resolve_freedom(surface, &input.locks)?;
     let setup = setup(&input, params, sizing, scale)?;
-    let (tolerance, limits) = (setup.tolerance, setup.limits.clone());
     let tree = reference_tree(params.tolerance_mode, input.reference);
-    let mut editor = open(surface, &freedom, input.reference, &tree, setup)?;
+    let mut editor = open(surface, &freedom, input.reference, &tree, setup.clone())?;
     let ending = run_phases(&mut editor, params, watch)?;
     let counts = editor.counts();
-    let distance_bound = editor.certified_distance(tolerance);
-    let result = editor.into_mesh().leave().surface;
-    let before = recount(input.surface, &resolve_freedom(input.surface, &input.locks)?, &limits);
-    let after = recount(&result, &resolve_freedom(&result, &input.locks)?, &limits);
-    let stats = ImproveQualityStats {
-        target_reached: params.target_faces.is_none() || ending == Ending::Target,
-        faces_before: input.surface.faces.len(),
+    let distance_bound = editor.certified_distance(setup.tolerance);
+    let mut result = editor.into_mesh().leave().surface;
+    inherit_fields(surface, &mut result);
+    let target_reached = params.target_faces.is_none() || ending == Ending::Target;
+    let end = End { target_reached, faces_refined: surface.faces.len(), counts, distance_bound };
+    let stats = stats(&input, &setup, &result, end)?;
+    Ok((result, stats))
+}
+
+/// Refines, mends and optimises `input.surface`, then records every collapse that the tolerance allows. The statistics
+/// are those of the coarsest front.
+///
+/// # Errors
+/// As [`improve_quality`].
+pub fn record_quality(
+    input: ImproveQualityInput<'_>,
+    params: &ImproveQualityParams,
+    watch: &Watch,
+) -> Result<(Hierarchy, ImproveQualityStats), ImproveQualityError> {
+    let scale = diagonal(input.reference);
+    let sizing = params.max_edge.as_ref().map(|size| size.resolve(input.surface, scale)).transpose();
+    let sizing = sizing.map_err(ImproveQualityError::Size)?;
+    let refined = refine_surface(&input, sizing.as_ref(), params.max_faces, watch)?;
+    let surface = refined.as_ref().unwrap_or(input.surface);
+    let setup = setup(&input, params, None, scale)?;
+    let tree = reference_tree(params.tolerance_mode, input.reference);
+    let source = Source { surface, reference: input.reference, tree: &tree, locks: input.locks };
+    let recorded: Recorded = build::<ImproveQualityError>(source, &setup, &rules(params), optimises(params), watch)?;
+    let coarsest = extract(&Front::coarsest(&recorded.hierarchy));
+    let end = End {
+        target_reached: true,
         faces_refined: surface.faces.len(),
+        counts: recorded.counts,
+        distance_bound: recorded.distance_bound,
+    };
+    let mut stats = stats(&input, &setup, &coarsest, end)?;
+    stats.hierarchy = Some(HierarchyReport::of(&recorded.hierarchy));
+    Ok((recorded.hierarchy, stats))
+}
+
+/// How the work ended.
+struct End {
+    target_reached: bool,
+    faces_refined: usize,
+    counts: Counts,
+    distance_bound: Option<f64>,
+}
+
+/// Counts shape and size on the result.
+fn stats(
+    input: &ImproveQualityInput<'_>,
+    setup: &Setup,
+    result: &Surface,
+    end: End,
+) -> Result<ImproveQualityStats, ImproveQualityError> {
+    let before = recount(input.surface, &resolve_freedom(input.surface, &input.locks)?, &setup.limits);
+    let after = recount(result, &resolve_freedom(result, &input.locks)?, &setup.limits);
+    let counts = end.counts;
+    Ok(ImproveQualityStats {
+        target_reached: end.target_reached,
+        faces_before: input.surface.faces.len(),
+        faces_refined: end.faces_refined,
         faces_after: result.faces.len(),
         collapses: counts.collapses,
         flips: counts.flips,
@@ -216,27 +274,31 @@ pub fn improve_quality(
         mean_stretch: after.mean_stretch,
         max_size: after.max_size,
         max_valence: after.max_valence,
-        tolerance,
-        distance_bound,
-    };
-    Ok((result, stats))
+        tolerance: setup.tolerance,
+        distance_bound: end.distance_bound,
+        hierarchy: None,
+    })
 }
 
-fn run_phases(editor: &mut Editor<'_>, params: &ImproveQualityParams, watch: &Watch) -> Result<Ending, Cancelled> {
+fn rules(params: &ImproveQualityParams) -> CollapseRules {
     let is_certified = params.tolerance_mode == ToleranceMode::Distance;
-    let rules = CollapseRules {
+    CollapseRules {
         min_stretch: FLOOR,
         mean_stretch: 0.0,
         must_improve: false,
         order: if is_certified { Order::OnSurface } else { Order::Printed },
         priority: Priority::QualityGain,
-    };
-    let target = params.target_faces.unwrap_or(0);
-    if params.optimize.unwrap_or(is_certified) {
-        coarsen(editor, &rules, target, watch)
-    } else {
-        simplify(editor, &rules, target, watch)
     }
+}
+
+fn optimises(params: &ImproveQualityParams) -> bool {
+    params.optimize.unwrap_or(params.tolerance_mode == ToleranceMode::Distance)
+}
+
+fn run_phases(editor: &mut Editor<'_>, params: &ImproveQualityParams, watch: &Watch) -> Result<Ending, Cancelled> {
+    let rules = rules(params);
+    let target = params.target_faces.unwrap_or(0);
+    if optimises(params) { coarsen(editor, &rules, target, watch) } else { simplify(editor, &rules, target, watch) }
 }
 
 /// Selective subdivision; `None` where nothing was asked for.
@@ -320,9 +382,13 @@ impl crate::step::Step for Step {
             doc: "what the tolerance is measured against; default: `from`",
         },
     ];
-    const OUTPUTS: &'static [OutputDef] = &[OutputDef { name: "main", port: OutPort::Is(Port::Surface) }];
+    const OUTPUTS: &'static [OutputDef] = &[
+        OutputDef { name: "main", port: OutPort::Is(Port::Surface) },
+        OutputDef { name: "hierarchy", port: OutPort::Is(Port::Hierarchy) },
+    ];
     const EDITS: bool = true;
-    const CARRIES: &'static str = "Maps groups, regions, marks, pins and seams; drops fields.";
+    const CARRIES: &'static str =
+        "Maps groups, regions, marks, pins and seams; takes fields from the nearest points of `from`.";
     const EXAMPLE: &'static str =
         "use = \"improve-quality\"\nfrom = \"clean\"\nmax-edge = \"2%\"\ntolerance = \"0.2%\"\n";
 
@@ -331,7 +397,7 @@ impl crate::step::Step for Step {
 
     fn run(
         inputs: &Inputs,
-        _output: &str,
+        output: &str,
         params: &ImproveQualityParams,
         locks: &Locks,
         watch: &Watch,
@@ -339,6 +405,10 @@ impl crate::step::Step for Step {
         let surface = inputs.surface("from")?;
         let reference = inputs.surface_opt("reference")?.unwrap_or(surface);
         let input = ImproveQualityInput { surface, reference, locks: locks.rules() };
+        if output == "hierarchy" {
+            let (hierarchy, stats) = record_quality(input, params, watch)?;
+            return Ok(Produced { artifact: Artifact::Hierarchy(Arc::new(hierarchy)), stats });
+        }
         let (surface, stats) = improve_quality(input, params, watch)?;
         Ok(Produced { artifact: Artifact::Surface(Arc::new(surface)), stats })
     }

@@ -1,5 +1,8 @@
 //! The catalog: every step that a recipe can use, one file and one line each.
 
+pub mod adapt_curvature;
+pub mod adapt_density;
+pub mod adapt_region;
 pub mod control_properties;
 pub mod features;
 pub mod improve_quality;
@@ -7,6 +10,7 @@ pub mod measure;
 pub mod read;
 pub mod refine;
 pub mod repair;
+pub mod resolution;
 pub mod select;
 pub mod subdivide;
 
@@ -22,5 +26,9 @@ pub static CATALOG: &[StepDef] = &[
     StepDef::of::<refine::Step>(),
     StepDef::of::<improve_quality::Step>(),
     StepDef::of::<control_properties::Step>(),
+    StepDef::of::<resolution::Step>(),
+    StepDef::of::<adapt_curvature::Step>(),
+    StepDef::of::<adapt_region::Step>(),
+    StepDef::of::<adapt_density::Step>(),
     StepDef::of::<measure::Step>(),
 ];

@@ -18,6 +18,8 @@ use crate::mesh::{
 use crate::metric::Measurement;
 use crate::step::{Artifact, FileBytes, Port};
 
+mod forest;
+
 /// Raised whenever the canonical bytes of equal artifacts change; part of every key.
 pub const CODEC_VERSION: u16 = 1;
 
@@ -58,9 +60,13 @@ pub fn encode(artifact: &Artifact) -> Vec<u8> {
         }
         Artifact::Surface(surface) => {
             let mut writer = start(Port::Surface, surface.points.len() * 24 + surface.faces.len() * 12);
-            encode_points(&mut writer, &surface.points);
-            writer.u32s(surface.faces.iter().flatten().map(|v| v.raw()));
-            encode_carried(&mut writer, &surface.carried);
+            encode_surface(&mut writer, surface);
+            writer.finish()
+        }
+        Artifact::Hierarchy(hierarchy) => {
+            let mut writer = start(Port::Hierarchy, 100 * hierarchy.node_count());
+            encode_surface(&mut writer, &hierarchy.finest);
+            forest::encode(&mut writer, hierarchy);
             writer.finish()
         }
         Artifact::Metrics(metrics) => {
@@ -87,6 +93,10 @@ pub fn decode(bytes: &[u8]) -> Result<Artifact, CodecError> {
         1 => Artifact::Soup(Arc::new(decode_soup(&mut reader)?)),
         2 => Artifact::Surface(Arc::new(decode_surface(&mut reader)?)),
         3 => Artifact::Metrics(Arc::new(decode_metrics(&mut reader)?)),
+        4 => {
+            let finest = decode_surface(&mut reader)?;
+            Artifact::Hierarchy(Arc::new(forest::decode(&mut reader, finest)?))
+        }
         _ => return Err(CodecError::Malformed("unknown kind of artifact")),
     };
     reader.end()?;
@@ -101,6 +111,7 @@ fn start(port: Port, capacity: usize) -> ColumnWriter {
         Port::Soup => 1,
         Port::Surface => 2,
         Port::Metrics => 3,
+        Port::Hierarchy => 4,
     };
     ColumnWriter::new([a, b, c, d, low, high, tag, 0], capacity + 1024)
 }
@@ -139,6 +150,12 @@ fn decode_soup(reader: &mut ColumnReader<'_>) -> Result<Soup, CodecError> {
     };
     let carried = decode_carried(reader)?;
     Ok(Soup { points, faces, carried })
+}
+
+fn encode_surface(writer: &mut ColumnWriter, surface: &Surface) {
+    encode_points(writer, &surface.points);
+    writer.u32s(surface.faces.iter().flatten().map(|v| v.raw()));
+    encode_carried(writer, &surface.carried);
 }
 
 fn decode_surface(reader: &mut ColumnReader<'_>) -> Result<Surface, CodecError> {

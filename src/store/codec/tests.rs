@@ -1,7 +1,10 @@
 //! Round trips, hostile bytes and stable hashes of the codec.
 
+use proptest::prelude::*;
+
 use super::*;
 use crate::mesh::edge_key;
+use crate::mesh::hierarchy::{Hierarchy, NodeId};
 
 fn id<K>(raw: u32) -> Id<K> {
     Id::from_raw(raw)
@@ -39,11 +42,70 @@ fn surface() -> Artifact {
     Artifact::Surface(Arc::new(Surface { points: points(), faces: faces.into(), carried: carried() }))
 }
 
+/// A sound forest: each merge takes two roots, with some of the other roots as its ring.
+fn forest(leaves: u32, picks: &[(u32, u32, u32, f64)], with_curvature: bool) -> Hierarchy {
+    let points = (0..leaves).map(|i| DVec3::splat(f64::from(i))).collect();
+    let faces = vec![[id(0), id(1), id(2)]; 2 * leaves as usize].into();
+    let finest = Surface { points, faces, carried: Carried::default() };
+    let values: Vec<f64> = (0..leaves).map(|i| f64::from(i % 7)).collect();
+    let mut hierarchy = Hierarchy::new(finest, values.clone(), if with_curvature { values } else { Vec::new() });
+    let mut roots: Vec<NodeId> = (0..leaves).map(id).collect();
+    for &(a, b, ring, size) in picks.iter().take(leaves as usize - 1) {
+        let kept = roots.swap_remove(a as usize % roots.len());
+        let removed = roots.swap_remove(b as usize % roots.len());
+        let ring = roots.iter().copied().skip(ring as usize % 5).take(6).collect::<Vec<_>>();
+        roots.push(hierarchy.record([kept, removed], DVec3::splat(size), 1 + (a % 2) as u8, ring, size));
+    }
+    hierarchy
+}
+
+fn hierarchy() -> Artifact {
+    Artifact::Hierarchy(Arc::new(forest(5, &[(0, 1, 0, 0.5), (2, 0, 1, 9.0)], true)))
+}
+
+proptest! {
+    #[test]
+    fn hierarchies_come_back(
+        leaves in 3_u32..40,
+        picks in prop::collection::vec((any::<u32>(), any::<u32>(), any::<u32>(), 0.0..10.0), 0..40),
+        with_curvature in any::<bool>(),
+    ) {
+        let before = forest(leaves, &picks, with_curvature);
+        prop_assert_eq!(before.defect(), None);
+        let bytes = encode(&Artifact::Hierarchy(Arc::new(before.clone())));
+        let Artifact::Hierarchy(after) = decode(&bytes).unwrap() else { panic!("a hierarchy went in") };
+        prop_assert_eq!(&*after, &before);
+        let mut damaged = bytes;
+        for &(at, value, ..) in &picks {
+            let at = at as usize % damaged.len();
+            damaged[at] = value as u8;
+            drop(decode(&damaged));
+        }
+    }
+}
+
+#[test]
+fn a_forest_that_contradicts_itself_is_refused() {
+    let good = forest(6, &[(0, 0, 0, 1.0), (0, 0, 0, 1.0), (0, 0, 0, 1.0)], true);
+    let wrongs: [fn(&mut Hierarchy); 5] = [
+        |h| h.merges[1].kept = h.merges[0].kept,
+        |h| h.merges[0].removed = id(8),
+        |h| h.rings[0] = h.merges[0].kept,
+        |h| h.merges[2].faces = 200,
+        |h| h.element_size[NodeId::from_raw(3)] = f64::NAN,
+    ];
+    for (place, wrong) in wrongs.into_iter().enumerate() {
+        let mut bad = good.clone();
+        wrong(&mut bad);
+        assert!(decode(&encode(&Artifact::Hierarchy(Arc::new(bad)))).is_err(), "{place}");
+    }
+}
+
 #[test]
 fn decoding_gives_back_the_same_bytes() {
     let file = Artifact::File(Arc::new(FileBytes { name: "part.stl".into(), bytes: vec![1, 2, 3] }));
     let metrics = Artifact::Metrics(Arc::new(Measurement::default()));
-    for artifact in [soup(), surface(), file, metrics] {
+    for artifact in [soup(), surface(), file, metrics, hierarchy()] {
         let bytes = encode(&artifact);
         let decoded = decode(&bytes).unwrap();
         assert_eq!(decoded.port(), artifact.port());
@@ -64,9 +126,10 @@ fn what_a_surface_carries_comes_back() {
 
 #[test]
 fn every_truncation_is_an_error() {
-    let bytes = encode(&surface());
-    for len in 0..bytes.len() {
-        assert!(decode(&bytes[..len]).is_err(), "{len} of {} bytes", bytes.len());
+    for bytes in [encode(&surface()), encode(&hierarchy())] {
+        for len in 0..bytes.len() {
+            assert!(decode(&bytes[..len]).is_err(), "{len} of {} bytes", bytes.len());
+        }
     }
 }
 

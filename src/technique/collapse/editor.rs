@@ -17,6 +17,7 @@ use crate::mesh::edit::{CollapsePlan, Placement, check_collapse, collapse};
 use crate::mesh::geometry::{area_vector, stretch, triangle_size};
 use crate::mesh::halfedge::{HalfedgeMesh, edge_of, halfedge_of, twin};
 use crate::mesh::{EdgeId, FaceId, Freedom, VertexId};
+use crate::technique::hierarchy::Recorder;
 use crate::technique::quadric::Quadric;
 
 /// Faces may turn by at most 45 degrees in one edit.
@@ -55,6 +56,21 @@ pub struct Counts {
     pub beyond_tolerance: usize,
     /// Edits refused because faces would intersect.
     pub collisions: usize,
+}
+
+impl std::ops::Add for Counts {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self {
+            collapses: self.collapses + other.collapses,
+            flips: self.flips + other.flips,
+            splits: self.splits + other.splits,
+            moves: self.moves + other.moves,
+            beyond_tolerance: self.beyond_tolerance + other.beyond_tolerance,
+            collisions: self.collisions + other.collisions,
+        }
+    }
 }
 
 /// The faces of one edit.
@@ -99,6 +115,7 @@ pub struct Editor<'a> {
     size: Vec<f32>,
     pub(in crate::technique) patch: Patch,
     ring: Ring,
+    recorder: Option<Box<Recorder>>,
 }
 
 impl<'a> Editor<'a> {
@@ -115,6 +132,7 @@ impl<'a> Editor<'a> {
             counts: Counts::default(),
             patch: Patch::default(),
             ring: Ring::new(),
+            recorder: None,
         };
         let faces: Vec<FaceId> = this.mesh.faces().collect();
         for f in faces {
@@ -145,6 +163,16 @@ impl<'a> Editor<'a> {
             Keeper::Distance { envelope, .. } => envelope.certifies(&self.mesh, tolerance).then_some(tolerance),
             Keeper::QuadricSum { .. } | Keeper::QuadricRms { .. } => None,
         }
+    }
+
+    /// Shows every collapse from now on to `recorder`, which was made with the surface of this workshop.
+    pub fn record(&mut self, recorder: Recorder) {
+        self.recorder = Some(Box::new(recorder));
+    }
+
+    /// Ends the record.
+    pub fn take_recorder(&mut self) -> Option<Recorder> {
+        self.recorder.take().map(|recorder| *recorder)
     }
 
     /// Ends the work.
@@ -343,6 +371,9 @@ impl<'a> Editor<'a> {
     }
 
     fn apply_collapse(&mut self, plan: &CollapsePlan, p: DVec3) {
+        if let Some(recorder) = &mut self.recorder {
+            recorder.collapse(&self.mesh, plan, p);
+        }
         collapse(&mut self.mesh, plan, p);
         self.quadrics.merge(plan.removed, plan.kept);
         self.counts.collapses += 1;

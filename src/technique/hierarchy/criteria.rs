@@ -78,6 +78,15 @@ pub struct Density {
     ratio: IdVec<Node, f64>,
 }
 
+/// Which operations are done.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Reach {
+    /// Those that are legal as the front stands.
+    Legal,
+    /// All, after whatever they need.
+    Forced,
+}
+
 /// A ratio as a sortable key; ratios are finite and not negative.
 fn key(ratio: f64) -> u64 {
     ratio.to_bits()
@@ -97,40 +106,65 @@ impl Density {
                 (None, None) => sizes[node],
             };
         }
+        Self::relative_to(hierarchy, &reference)
+    }
+
+    /// The distribution that has `leaf_size` at each leaf.
+    pub fn like(hierarchy: &Hierarchy, leaf_size: impl Fn(VertexId) -> f64) -> Self {
+        let mut reference: IdVec<Node, f64> = IdVec::filled(0.0, hierarchy.node_count());
+        for node in hierarchy.nodes() {
+            reference[node] = match hierarchy.merge(node) {
+                Some(merge) => 0.5 * (reference[merge.kept] + reference[merge.removed]),
+                None => leaf_size(VertexId::from_raw(node.raw())),
+            };
+        }
+        Self::relative_to(hierarchy, &reference)
+    }
+
+    fn relative_to(hierarchy: &Hierarchy, reference: &IdVec<Node, f64>) -> Self {
+        let sizes = &hierarchy.element_size;
         let ratio = |n: NodeId| if reference[n] > 0.0 { sizes[n] / reference[n] } else { 0.0 };
         Self { ratio: hierarchy.nodes().map(ratio).collect() }
     }
 
-    /// Splits or merges until the front has `faces` faces, or the next operation would overshoot by more than it nears.
+    /// Splits or merges until the front has `faces` faces, or one or two less or more; or as near as the forest allows.
+    ///
+    /// What one operation forces may overshoot far; legal operations the other way then bring the front back.
     pub fn move_to(&self, front: &mut Front<'_>, faces: usize, watch: &Watch) -> Result<(), Cancelled> {
-        if front.face_count() < faces { self.refine(front, faces, watch) } else { self.coarsen(front, faces, watch) }
+        if front.face_count() < faces {
+            self.refine(front, faces, Reach::Forced, watch)?;
+            self.coarsen(front, faces, Reach::Legal, watch)
+        } else {
+            self.coarsen(front, faces, Reach::Forced, watch)?;
+            self.refine(front, faces, Reach::Legal, watch)
+        }
     }
 
-    fn refine(&self, front: &mut Front<'_>, faces: usize, watch: &Watch) -> Result<(), Cancelled> {
-        let mut queue: BinaryHeap<(u64, Reverse<NodeId>)> =
-            front.nodes().map(|n| (key(self.ratio[n]), Reverse(n))).collect();
+    fn refine(&self, front: &mut Front<'_>, faces: usize, reach: Reach, watch: &Watch) -> Result<(), Cancelled> {
+        // Of equals the latest merge goes first: the later one was made, the less must be split before it.
+        let mut queue: BinaryHeap<(u64, NodeId)> = front.nodes().map(|n| (key(self.ratio[n]), n)).collect();
         while front.face_count() < faces {
-            let Some((_, Reverse(node))) = queue.pop() else { break };
+            let Some((_, node)) = queue.pop() else { break };
             watch.check()?;
-            if !front.contains(node) {
+            if !front.contains(node) || (reach == Reach::Legal && !front.can_split(node)) {
                 continue;
             }
             for split in front.force_split(node) {
                 if let Some(merge) = front.hierarchy().merge(split) {
-                    queue.extend([merge.kept, merge.removed].map(|n| (key(self.ratio[n]), Reverse(n))));
+                    queue.extend([merge.kept, merge.removed].map(|n| (key(self.ratio[n]), n)));
                 }
             }
         }
         Ok(())
     }
 
-    fn coarsen(&self, front: &mut Front<'_>, faces: usize, watch: &Watch) -> Result<(), Cancelled> {
+    fn coarsen(&self, front: &mut Front<'_>, faces: usize, reach: Reach, watch: &Watch) -> Result<(), Cancelled> {
         let parents = |front: &Front<'_>, n: NodeId| front.parent(n).map(|p| (Reverse(key(self.ratio[p])), Reverse(p)));
         let mut queue: BinaryHeap<_> = front.nodes().filter_map(|n| parents(front, n)).collect();
         while front.face_count() > faces {
             let Some((_, Reverse(node))) = queue.pop() else { break };
             watch.check()?;
-            if front.contains(node) {
+            if front.contains(node) || (reach == Reach::Legal && !front.can_merge(node)) {
                 continue;
             }
             for merged in front.force_merge(node) {

@@ -45,6 +45,11 @@ impl<'a> Front<'a> {
         front
     }
 
+    /// The front with about `faces` faces, or the coarsest one.
+    pub fn base(hierarchy: &'a Hierarchy, faces: Option<usize>) -> Self {
+        faces.map_or_else(|| Self::coarsest(hierarchy), |faces| Self::with_faces(hierarchy, faces))
+    }
+
     /// The front of all roots: the coarsest mesh.
     pub fn coarsest(hierarchy: &'a Hierarchy) -> Self {
         Self::with_faces(hierarchy, 0)

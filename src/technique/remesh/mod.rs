@@ -187,6 +187,15 @@ pub fn coarsen(
     Ok(ending)
 }
 
+/// Collapses until no edge is valid, those that leave good faces first, and nothing else in between.
+pub fn coarsen_purely(editor: &mut Editor<'_>, rules: &CollapseRules, watch: &Watch) -> Result<Ending, Cancelled> {
+    for (least, mean) in COMFORT.into_iter().chain(LESS_COMFORT) {
+        let rules = CollapseRules { min_stretch: least.max(rules.min_stretch), mean_stretch: mean, ..*rules };
+        simplify(editor, &rules, 0, watch)?;
+    }
+    simplify(editor, rules, 0, watch)
+}
+
 /// Rounds of splits, flips and relaxation. Returns the number of edits that gained in the last round.
 pub fn optimise(editor: &mut Editor<'_>, rounds: usize, watch: &Watch) -> Result<usize, Cancelled> {
     let mut last = 0;
