@@ -26,7 +26,8 @@ use crate::step::{
     Artifact, InputDef, Inputs, Length, Locks, OutPort, OutputDef, Port, Produced, Resolution, Share,
     Step as StepContract, StepFailure,
 };
-use crate::technique::hierarchy::{Front, FrontReport, curvature_thresholds, extract_measured};
+use crate::technique::hierarchy::{Front, curvature_thresholds};
+use crate::technique::levels::{FrontReport, extract_measured};
 use crate::watch::{Cancelled, Watch};
 
 /// Takes a mesh from a hierarchy that is the finer the more the surface bends.

@@ -29,7 +29,8 @@ use crate::step::{
     Artifact, InputDef, Inputs, Locks, OutPort, OutputDef, Port, Produced, Resolution, Share, Step as StepContract,
     StepFailure,
 };
-use crate::technique::hierarchy::{Density, Front, FrontReport, extract_measured};
+use crate::technique::hierarchy::{Density, Front};
+use crate::technique::levels::{FrontReport, extract_measured};
 use crate::watch::{Cancelled, Watch};
 
 /// Takes a mesh of the number of faces wanted from a hierarchy, with the distribution of element sizes kept.

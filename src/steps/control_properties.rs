@@ -38,7 +38,8 @@ use crate::technique::collapse::session::{
     Recount, Setup, ToleranceMode, Violation, diagonal, open, recount, reference_tree,
 };
 use crate::technique::collapse::{CollapseRules, Counts, Editor, Ending, Limits, Order, Priority, SizeField, simplify};
-use crate::technique::hierarchy::{Front, HierarchyReport, Recorded, Source, build, extract};
+use crate::technique::hierarchy::{Front, extract};
+use crate::technique::levels::{HierarchyReport, Recorded, Source, build};
 use crate::technique::remesh::{coarsen, raise_stretch};
 use crate::watch::{Cancelled, Watch};
 

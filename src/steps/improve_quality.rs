@@ -32,7 +32,8 @@ use crate::step::{
 };
 use crate::technique::collapse::session::{Setup, ToleranceMode, diagonal, open, recount, reference_tree};
 use crate::technique::collapse::{CollapseRules, Counts, Editor, Ending, Limits, Order, Priority, SizeField, simplify};
-use crate::technique::hierarchy::{Front, HierarchyReport, Recorded, Source, build, extract};
+use crate::technique::hierarchy::{Front, extract};
+use crate::technique::levels::{HierarchyReport, Recorded, Source, build};
 use crate::technique::refine::{MAX_FACES, MaxEdge, RefineError, refine};
 use crate::technique::remesh::coarsen;
 use crate::watch::{Cancelled, Watch};

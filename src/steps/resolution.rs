@@ -22,7 +22,8 @@ use crate::mesh::{Hierarchy, Surface};
 use crate::step::{
     Artifact, InputDef, Inputs, Locks, OutPort, OutputDef, Port, Produced, Share, Step as StepContract, StepFailure,
 };
-use crate::technique::hierarchy::{Front, FrontReport, extract_measured};
+use crate::technique::hierarchy::Front;
+use crate::technique::levels::{FrontReport, extract_measured};
 use crate::watch::{Cancelled, Watch};
 
 /// Takes a mesh of the number of faces wanted from a hierarchy.

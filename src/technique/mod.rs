@@ -7,6 +7,7 @@ pub mod feature;
 pub mod halve_edges;
 pub mod heap;
 pub mod hierarchy;
+pub mod levels;
 pub mod quadric;
 pub mod refine;
 pub mod remesh;

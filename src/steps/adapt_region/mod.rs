@@ -31,7 +31,8 @@ use crate::mesh::{Soup, Surface};
 use crate::step::{
     Artifact, InputDef, Inputs, Locks, OutPort, OutputDef, Port, Produced, Step as StepContract, StepFailure,
 };
-use crate::technique::hierarchy::{Front, FrontReport, Thresholds, extract_measured, region_thresholds};
+use crate::technique::hierarchy::{Front, Thresholds, region_thresholds};
+use crate::technique::levels::{FrontReport, extract_measured};
 use crate::watch::{Cancelled, Watch};
 
 pub use params::{AdaptRegionParams, Ball, BoxRegion, HalfSpace};

@@ -20,19 +20,15 @@
 //! - The finest front is the input bit for bit; split and merge undo each other.
 //! - Euler characteristic and boundary loops are the same on every front.
 
-mod build;
 mod criteria;
 mod extract;
 mod front;
 mod record;
-mod report;
 
-pub use build::{Recorded, Source, build};
 pub use criteria::{Density, Thresholds, curvature_thresholds, region_thresholds};
 pub use extract::extract;
 pub use front::Front;
 pub use record::Recorder;
-pub use report::{FrontReport, HierarchyReport, extract_measured};
 
 #[cfg(test)]
 mod tests;

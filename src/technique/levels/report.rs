@@ -5,8 +5,6 @@ use std::collections::BTreeSet;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::extract::extract;
-use super::front::Front;
 use crate::mesh::geometry::triangle_normal;
 use crate::mesh::hierarchy::NodeId;
 use crate::mesh::topology::EdgeTable;
@@ -15,6 +13,7 @@ use crate::mesh::{EdgeKey, Hierarchy, ResolvedFreedom, Surface, VertexId, edge_k
 use crate::metric::distance::{Target, two_sided};
 use crate::technique::collapse::session::{Recount, recount};
 use crate::technique::collapse::{Limits, SizeField};
+use crate::technique::hierarchy::{Front, extract};
 use crate::watch::{Cancelled, Watch};
 
 /// Neighbouring faces are folded over where the cosine between their normals is less: 143 degrees.

@@ -3,7 +3,6 @@
 //! What a front shows was seen while recording, so thresholds hold on every front if they hold on the finest one. That
 //! is why faces that break the least stretch are mended *before* the record begins.
 
-use super::record::Recorder;
 use crate::mesh::bvh::TriangleBvh;
 use crate::mesh::halfedge::EnterError;
 use crate::mesh::transfer::inherit_fields;
@@ -11,6 +10,7 @@ use crate::mesh::{FreedomError, Hierarchy, LockRules, Surface, resolve_freedom};
 use crate::technique::collapse::session::{Setup, open};
 use crate::technique::collapse::{CollapseRules, Counts, simplify};
 use crate::technique::curvature::{Principal, mean_edge, principal_curvatures};
+use crate::technique::hierarchy::Recorder;
 use crate::technique::remesh::{coarsen_purely, optimise, raise_stretch};
 use crate::watch::{Cancelled, Watch};
 
