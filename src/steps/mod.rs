@@ -9,6 +9,7 @@ pub mod improve_quality;
 pub mod measure;
 pub mod read;
 pub mod refine;
+pub mod remove_features;
 pub mod repair;
 pub mod resolution;
 pub mod select;
@@ -22,6 +23,7 @@ pub static CATALOG: &[StepDef] = &[
     StepDef::of::<repair::Step>(),
     StepDef::of::<select::Step>(),
     StepDef::of::<features::Step>(),
+    StepDef::of::<remove_features::Step>(),
     StepDef::of::<subdivide::Step>(),
     StepDef::of::<refine::Step>(),
     StepDef::of::<improve_quality::Step>(),

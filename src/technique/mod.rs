@@ -2,6 +2,7 @@
 
 pub mod collapse;
 pub mod curvature;
+pub mod defeature;
 pub mod eigen;
 pub mod feature;
 pub mod halve_edges;

@@ -1,0 +1,186 @@
+//! Holes and bosses as chains of coaxial rings.
+//!
+//! From each cylindrical ring that faces its axis (a hole) or away from it (a boss) the chain grows over both rims:
+//! over further sides, over chamfers and countersinks, over a step when another side follows it, and it ends at a floor
+//! or at a rim of the surface that stays.
+
+use super::patches::Patches;
+use super::round::{Facing, Form, Ring, ring};
+use super::{Kind, Reason, Rejected};
+use crate::mesh::Surface;
+
+/// Largest distance of a rim from its circle, as a share of the radius: the sagitta of a chord of 36 degrees.
+const ROUND: f64 = 0.05;
+/// Axes of one feature differ by less than 8 degrees, and lie closer than this share of the radius.
+const PARALLEL: f64 = 0.99;
+const CONCENTRIC: f64 = 0.05;
+/// A chamfer or countersink is at most this much wider than its hole.
+const WIDEST_CONE: f64 = 2.0;
+/// A floor lies within this much of its rim's radius.
+const WIDEST_FLOOR: f64 = 1.1;
+
+/// A feature that may be removed.
+#[derive(Clone, Debug)]
+pub(super) struct Cavity {
+    pub(super) kind: Kind,
+    /// Patches that go.
+    pub(super) patches: Vec<u32>,
+    /// Rims that are to be filled: patch and number of its rim.
+    pub(super) rims: Vec<(u32, usize)>,
+    /// What the statistics say of it.
+    pub(super) ring: Ring,
+    pub(super) diameter: f64,
+}
+
+/// Where a chain ends.
+enum End {
+    /// At the surface that stays, over this rim of this patch.
+    Base(u32, usize),
+    /// At a floor, which is in the chain already.
+    Floor,
+}
+
+/// Looks for features on the patches of a surface.
+pub(super) struct Finder<'a> {
+    surface: &'a Surface,
+    patches: &'a Patches,
+    rings: Vec<Option<Ring>>,
+    /// The largest diameter that is removed.
+    most: f64,
+}
+
+impl<'a> Finder<'a> {
+    pub(super) fn new(surface: &'a Surface, patches: &'a Patches, most: f64) -> Self {
+        let rings = patches.all.iter().map(|p| if p.rims.len() < 2 { None } else { ring(surface, p) }).collect();
+        Self { surface, patches, rings, most }
+    }
+
+    /// The features of the wanted kinds, each patch in one at most, and what looked like one but is none.
+    pub(super) fn find(&self, kinds: &[Kind]) -> (Vec<Cavity>, Vec<Rejected>) {
+        let mut used = vec![false; self.rings.len()];
+        let (mut cavities, mut rejected) = (Vec::new(), Vec::new());
+        for number in 0..self.rings.len() {
+            let Some(ring) = self.rings[number].as_ref().filter(|ring| ring.form == Form::Side) else { continue };
+            let wanted = match ring.facing {
+                Facing::In => kinds.contains(&Kind::ThroughHoles) || kinds.contains(&Kind::BlindHoles),
+                Facing::Out => kinds.contains(&Kind::Bosses),
+                Facing::Mixed => false,
+            };
+            if !wanted || used[number] {
+                continue;
+            }
+            if let Some(reason) = self.refusal(number, ring) {
+                rejected.push(Rejected { centre: ring.centre, diameter: ring.diameter(), reason });
+                continue;
+            }
+            let Some(cavity) = self.grow(number as u32, ring) else { continue };
+            if kinds.contains(&cavity.kind) && !cavity.patches.iter().any(|&p| used[p as usize]) {
+                for &p in &cavity.patches {
+                    used[p as usize] = true;
+                }
+                cavities.push(cavity);
+            }
+        }
+        (cavities, rejected)
+    }
+
+    /// Why a side does not begin a feature.
+    fn refusal(&self, number: usize, ring: &Ring) -> Option<Reason> {
+        let patch = &self.patches.all[number];
+        if ring.diameter() > self.most {
+            return Some(Reason::TooLarge);
+        }
+        if patch.rims.len() != 2 || patch.characteristic != 0 {
+            return Some(Reason::CutByOthers);
+        }
+        if patch.rims.iter().flat_map(|rim| &rim.beyond).any(Option::is_none) {
+            return Some(Reason::OpenRim);
+        }
+        (ring.error() > ROUND).then_some(Reason::NotRound)
+    }
+
+    /// The chain through a side.
+    fn grow(&self, seed: u32, ring: &Ring) -> Option<Cavity> {
+        let mut patches = vec![seed];
+        let ends = [0, 1].map(|rim| self.extend(seed, rim, ring, &mut patches));
+        let rims: Vec<(u32, usize)> = ends
+            .iter()
+            .filter_map(|end| match *end {
+                End::Base(patch, rim) => Some((patch, rim)),
+                End::Floor => None,
+            })
+            .collect();
+        let kind = match (ring.facing, rims.len()) {
+            (Facing::In, 2) => Kind::ThroughHoles,
+            (Facing::In, 1) => Kind::BlindHoles,
+            (Facing::Out, 1) => Kind::Bosses,
+            _ => return None,
+        };
+        let sides = patches.iter().filter_map(|&p| self.rings[p as usize].as_ref()).filter(|r| r.form == Form::Side);
+        let diameter = sides.map(Ring::diameter).fold(0.0, f64::max);
+        Some(Cavity { kind, patches, rims, ring: ring.clone(), diameter })
+    }
+
+    /// Goes on over a rim as long as the feature does.
+    fn extend(&self, mut patch: u32, mut rim: usize, seed: &Ring, chain: &mut Vec<u32>) -> End {
+        loop {
+            let here = End::Base(patch, rim);
+            let Some((next, entered)) = self.patches.across(&self.patches.all[patch as usize].rims[rim]) else {
+                return here;
+            };
+            if chain.contains(&next) {
+                return here;
+            }
+            if self.is_floor(next, seed) {
+                chain.push(next);
+                return End::Floor;
+            }
+            let Some(ring) = self.coaxial(next, seed) else { return here };
+            let goes_on = match ring.form {
+                Form::Side | Form::Cone => self.belongs(ring, seed),
+                Form::Flat => self
+                    .patches
+                    .across(&self.patches.all[next as usize].rims[1 - entered])
+                    .filter(|(beyond, _)| !chain.contains(beyond))
+                    .and_then(|(beyond, _)| self.coaxial(beyond, seed))
+                    .is_some_and(|beyond| beyond.form != Form::Flat && self.belongs(beyond, seed)),
+            };
+            if !goes_on {
+                return here;
+            }
+            chain.push(next);
+            (patch, rim) = (next, 1 - entered);
+        }
+    }
+
+    fn belongs(&self, ring: &Ring, seed: &Ring) -> bool {
+        let most = if ring.form == Form::Cone { WIDEST_CONE * seed.diameter() } else { self.most };
+        ring.facing == seed.facing && ring.diameter() <= most && ring.error() <= ROUND
+    }
+
+    /// The ring of a patch that turns about the axis of `seed`.
+    fn coaxial(&self, patch: u32, seed: &Ring) -> Option<&Ring> {
+        let (all, ring) = (&self.patches.all[patch as usize], self.rings[patch as usize].as_ref()?);
+        let is_ring = all.rims.len() == 2
+            && all.characteristic == 0
+            && all.rims.iter().flat_map(|rim| &rim.beyond).all(Option::is_some);
+        let off = ring.centre - seed.centre;
+        let aside = (off - seed.axis * off.dot(seed.axis)).length();
+        let fits = ring.axis.dot(seed.axis).abs() > PARALLEL && aside <= CONCENTRIC * seed.diameter();
+        (is_ring && fits).then_some(ring)
+    }
+
+    /// Whether a patch is a disk that lies inside the feature.
+    fn is_floor(&self, patch: u32, seed: &Ring) -> bool {
+        let all = &self.patches.all[patch as usize];
+        if all.rims.len() != 1 || all.characteristic != 1 {
+            return false;
+        }
+        let aside = |v: &crate::mesh::VertexId| {
+            let off = self.surface.points[*v] - seed.centre;
+            (off - seed.axis * off.dot(seed.axis)).length()
+        };
+        let rim = all.rims[0].vertices.iter().map(aside).fold(0.0, f64::max);
+        all.faces.iter().flat_map(|&f| &self.surface.faces[f]).all(|v| aside(v) <= WIDEST_FLOOR * rim)
+    }
+}

@@ -1,0 +1,136 @@
+//! The pieces into which marked edges cut a surface, with their rims.
+
+use rustc_hash::FxHashMap;
+
+use crate::mesh::id::Face;
+use crate::mesh::topology::EdgeTable;
+use crate::mesh::{FaceId, IdVec, Surface, VertexId};
+
+/// One closed chain of edges round a patch.
+#[derive(Clone, Debug)]
+pub(super) struct Rim {
+    /// Its vertices in the direction of the patch's faces; edge `i` goes from vertex `i` to the next one.
+    pub(super) vertices: Vec<VertexId>,
+    /// The face beyond each edge; `None` on the border of an open surface.
+    pub(super) beyond: Vec<Option<FaceId>>,
+}
+
+/// Connected faces with no marked edge between them.
+#[derive(Clone, Debug)]
+pub(super) struct Patch {
+    pub(super) faces: Vec<FaceId>,
+    /// Empty where rims touch each other or themselves at a vertex.
+    pub(super) rims: Vec<Rim>,
+    /// Euler characteristic.
+    pub(super) characteristic: i64,
+}
+
+/// All patches, numbered by their lowest face.
+#[derive(Debug)]
+pub(super) struct Patches {
+    pub(super) of_face: IdVec<Face, u32>,
+    pub(super) all: Vec<Patch>,
+}
+
+impl Patches {
+    /// Cuts the surface along its marked edges.
+    pub(super) fn new(surface: &Surface) -> Self {
+        let edges = EdgeTable::new(surface);
+        let sides = edges.edges_of_triangles(surface.faces.len());
+        let is_marked: Vec<bool> = edges.keys().iter().map(|key| surface.carried.marks.contains_key(key)).collect();
+        let mut of_face = IdVec::<Face, u32>::filled(u32::MAX, surface.faces.len());
+        let mut all: Vec<Patch> = Vec::new();
+        for first in surface.faces.ids() {
+            if of_face[first] != u32::MAX {
+                continue;
+            }
+            let number = all.len() as u32;
+            let mut faces = vec![first];
+            of_face[first] = number;
+            let mut at = 0;
+            while let Some(&f) = faces.get(at) {
+                at += 1;
+                for e in sides[f].into_iter().filter(|e| !is_marked[e.index()]) {
+                    for side in edges.sides(e) {
+                        if of_face[side.face] == u32::MAX {
+                            of_face[side.face] = number;
+                            faces.push(side.face);
+                        }
+                    }
+                }
+            }
+            faces.sort_unstable();
+            all.push(Patch { faces, rims: Vec::new(), characteristic: 0 });
+        }
+        let mut this = Self { of_face, all };
+        for number in 0..this.all.len() {
+            this.find_rims(surface, &edges, &sides, number);
+        }
+        this
+    }
+
+    fn find_rims(
+        &mut self,
+        surface: &Surface,
+        edges: &EdgeTable,
+        sides: &IdVec<Face, [crate::mesh::EdgeId; 3]>,
+        number: usize,
+    ) {
+        let faces = &self.all[number].faces;
+        let mut out: Vec<(VertexId, VertexId, Option<FaceId>)> = Vec::new();
+        let mut vertices: Vec<VertexId> = Vec::with_capacity(3 * faces.len());
+        let (mut inner, mut is_pinched) = (0_usize, false);
+        for &f in faces {
+            let corners = surface.faces[f];
+            vertices.extend(corners);
+            for k in 0..3 {
+                let beyond = edges.sides(sides[f][k]).iter().map(|s| s.face).find(|&g| g != f);
+                if beyond.is_some_and(|g| self.of_face[g] == number as u32) {
+                    inner += 1;
+                } else {
+                    out.push((corners[k], corners[(k + 1) % 3], beyond));
+                }
+            }
+        }
+        vertices.sort_unstable();
+        vertices.dedup();
+        let count = vertices.len() as i64 - (inner / 2 + out.len()) as i64 + faces.len() as i64;
+        out.sort_unstable();
+        is_pinched |= out.windows(2).any(|pair| pair[0].0 == pair[1].0);
+        let rims = if is_pinched { Vec::new() } else { chains(&out) };
+        self.all[number].characteristic = count;
+        self.all[number].rims = rims;
+    }
+
+    /// The one patch beyond a rim, where it is bounded there by the same rim: its number and its rim's.
+    pub(super) fn across(&self, rim: &Rim) -> Option<(u32, usize)> {
+        let first = self.of_face[(*rim.beyond.first()?)?];
+        if rim.beyond.iter().any(|f| f.is_none_or(|f| self.of_face[f] != first)) {
+            return None;
+        }
+        let start = rim.vertices[0];
+        let same = |other: &Rim| other.vertices.len() == rim.vertices.len() && other.vertices.contains(&start);
+        self.all[first as usize].rims.iter().position(same).map(|at| (first, at))
+    }
+}
+
+/// Closed chains out of directed edges, at most one of which leaves a vertex.
+fn chains(out: &[(VertexId, VertexId, Option<FaceId>)]) -> Vec<Rim> {
+    let next: FxHashMap<VertexId, usize> = out.iter().enumerate().map(|(i, side)| (side.0, i)).collect();
+    let mut used = vec![false; out.len()];
+    let mut rims = Vec::new();
+    for first in 0..out.len() {
+        let mut rim = Rim { vertices: Vec::new(), beyond: Vec::new() };
+        let mut at = first;
+        while !std::mem::replace(&mut used[at], true) {
+            rim.vertices.push(out[at].0);
+            rim.beyond.push(out[at].2);
+            let Some(&following) = next.get(&out[at].1) else { break };
+            at = following;
+        }
+        if !rim.vertices.is_empty() {
+            rims.push(rim);
+        }
+    }
+    rims
+}
