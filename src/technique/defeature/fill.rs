@@ -6,6 +6,7 @@ use glam::DVec3;
 use rustc_hash::FxHashSet;
 
 use crate::mesh::bvh::{Primitive, TriangleBvh};
+use crate::mesh::geometry::{Aabb, area_vector};
 use crate::mesh::predicate::triangle_triangle;
 use crate::mesh::{Carried, EdgeKey, FaceId, IdVec, LockRules, Rim, Surface, VertexId, edge_key, resolve_freedom};
 use crate::technique::collapse::session::{Setup, ToleranceMode, open};
@@ -22,7 +23,9 @@ const COARSENING: f64 = 1.5;
 /// The longest side of a fill's faces, in sizes.
 const LONGEST: f64 = 1.6;
 /// How far improvement may move a fill that is not flat, in sizes.
-const SLACK: f64 = 0.05;
+const SLACK: f64 = 0.1;
+/// A fill is flat if its rim lies this near to a plane, as a share of its extent.
+const FLAT: f64 = 1e-9;
 /// Faces of one fill at most; what would need more stays coarse.
 const MOST_FACES: usize = 100_000;
 
@@ -96,8 +99,10 @@ impl Fill {
         watch.check()?;
         let Ok(freedom) = resolve_freedom(&fine, &locks) else { return Ok(None) };
         let tree = TriangleBvh::of_surface(&membrane);
+        // In a plane nothing can leave the membrane, and quadrics are cheaper than certified distances.
+        let mode = if is_flat(&membrane) { ToleranceMode::QuadricRms } else { ToleranceMode::Distance };
         let setup = Setup {
-            mode: ToleranceMode::Distance,
+            mode,
             tolerance: SLACK * size,
             feature_tolerance: SLACK * size,
             feature_weight: 100.0,
@@ -155,4 +160,14 @@ impl Fill {
                 .iter()
                 .any(|&other| own.for_each_in(&other.bounds(), |_, mine| stop_at(hit(*mine, other))).is_break())
     }
+}
+
+/// Whether all points lie in the plane of the widest triangle.
+fn is_flat(membrane: &Surface) -> bool {
+    let normals = membrane.faces.ids().map(|f| area_vector(membrane.corners(f)));
+    let widest = normals.fold(DVec3::ZERO, |a, b| if b.length_squared() > a.length_squared() { b } else { a });
+    let normal = widest.normalize_or_zero();
+    let heights = || membrane.points.iter().map(|p| (*p - membrane.points[VertexId::from_raw(0)]).dot(normal));
+    let (low, high) = heights().fold((0.0_f64, 0.0_f64), |(low, high), h| (low.min(h), high.max(h)));
+    high - low <= FLAT * Aabb::of(membrane.points.iter().copied()).diagonal()
 }

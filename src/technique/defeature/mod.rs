@@ -24,6 +24,8 @@ mod fill;
 mod patches;
 mod rebuild;
 mod round;
+#[cfg(test)]
+mod tests;
 
 use std::collections::BTreeSet;
 
