@@ -81,7 +81,7 @@ fn ply_elements_in_any_order_with_fields() {
 #[test]
 fn bulk_data_in_short_long_and_free_fields() {
     let (soup, counts) = load("mixed_fields.bdf");
-    let points: Vec<[f64; 3]> = soup.points.iter().map(|p| p.to_array()).collect();
+    let points: Vec<[f64; 3]> = soup.points.iter().map(glam::DVec3::to_array).collect();
     assert_eq!(points, [[0.0; 3], [1.5, 0.0, 0.0], [1.5, 2e-3, 0.0], [0.0, 2.0, -0.25], [9.0, 9.0, 9.0]]);
     assert_eq!((counts.nodes_dropped, counts.elements_dropped), (1, 1));
     assert_eq!(corners(&soup, 0), [0, 1, 2]);
@@ -105,7 +105,9 @@ fn binary_off_in_both_byte_orders_with_and_without_colours() {
         let mut file = b"OFF BINARY\n".to_vec();
         let mut push = |raw: u32| file.extend(if big { raw.to_be_bytes() } else { raw.to_le_bytes() });
         [3, 2, 0].into_iter().for_each(&mut push);
-        [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 2.5, 0.0].into_iter().for_each(|x: f32| push(x.to_bits()));
+        for x in [0.0_f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 2.5, 0.0] {
+            push(x.to_bits());
+        }
         for corners in [[0, 1, 2], [2, 1, 0]] {
             push(3);
             corners.into_iter().for_each(&mut push);

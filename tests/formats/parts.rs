@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 use meshmill::format::{Format, read};
-use meshmill::mesh::{Soup, VertexId};
+use meshmill::mesh::{Facet, Soup, VertexId};
 use meshmill::watch::Watch;
 
 fn folder() -> Option<PathBuf> {
@@ -25,7 +25,7 @@ fn load(path: &Path) -> Soup {
 /// Distinct positions that faces use: what the manifest counts.
 fn distinct_points(soup: &Soup) -> usize {
     let corner = |v: &VertexId| (soup.points[*v] + DVec3::ZERO).to_array().map(f64::to_bits);
-    let used: std::collections::BTreeSet<_> = soup.faces.iter().flat_map(|f| f.corners()).map(corner).collect();
+    let used: std::collections::BTreeSet<_> = soup.faces.iter().flat_map(Facet::corners).map(corner).collect();
     used.len()
 }
 
@@ -62,7 +62,7 @@ fn all_variants_of_one_part_are_the_same_mesh() {
     assert!(names.len() >= 4, "{names:?}");
     // STL numbers points by their first use and holds 32 bits: positions are compared as such, face by face.
     let corners = |soup: &Soup| -> Vec<[u32; 3]> {
-        let corners = soup.faces.iter().flat_map(|f| f.corners()).map(|&v| soup.points[v]);
+        let corners = soup.faces.iter().flat_map(Facet::corners).map(|&v| soup.points[v]);
         corners.map(|p| p.to_array().map(|x| (x as f32 + 0.0).to_bits())).collect()
     };
     let first = corners(&load(&names[0]));

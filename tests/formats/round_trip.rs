@@ -101,7 +101,7 @@ proptest! {
     fn bulk_data_keeps_faces_and_a_partition_into_groups(soup in any_soup(), cut in any::<usize>()) {
         let mut soup = soup;
         // A coordinate has 16 characters; a quad with a repeated corner is a triangle there.
-        for point in soup.points.iter_mut() {
+        for point in &mut soup.points {
             *point = DVec3::from_array(point.to_array().map(|x| f64::from(x as f32 as i16) / 64.0));
         }
         soup.faces = soup.faces.iter().filter(|f| matches!(f, Facet::Tri(_))).copied().collect();
@@ -138,7 +138,7 @@ proptest! {
 
     #[test]
     fn binary_stl_and_off_keep_what_32_bits_hold(mut soup in any_soup()) {
-        for point in soup.points.iter_mut() {
+        for point in &mut soup.points {
             *point = DVec3::from_array(point.to_array().map(|x| f64::from(x as f32)));
         }
         let options = WriteOptions { binary: true, header: "solid bait".into(), ..WriteOptions::default() };
