@@ -61,20 +61,30 @@ impl Loop<'_> {
                 if (i, k) != (0, count - 1) && !(self.is_free)(i, k) {
                     continue;
                 }
-                let best = (i + 1..k).filter_map(|m| self.weigh(&table, i, m, k).map(|weight| (weight, m)));
-                let best = best.min_by(|(a, m), (b, n)| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)).then(m.cmp(n)));
-                if let Some((weight, m)) = best {
-                    table.set(i, k, weight, m);
+                let mut best = ((f64::INFINITY, f64::INFINITY), 0);
+                for m in i + 1..k {
+                    // Of equal ones the lowest stays. Most are worse already without the triangle between.
+                    let weight = self.weigh(&table, i, m, k, best.0.0);
+                    if let Some(weight) = weight.filter(|weight| *weight < best.0) {
+                        best = (weight, m);
+                    }
+                }
+                if best.1 > 0 {
+                    table.set(i, k, best.0, best.1);
                 }
             }
         }
         table.triangles(count)
     }
 
-    /// The largest bend and the area of the triangulation of `i..=k` that has the triangle over `i`, `m`, `k`.
-    fn weigh(&self, table: &Table, i: usize, m: usize, k: usize) -> Option<(f64, f64)> {
+    /// The largest bend and the area of the triangulation of `i..=k` that has the triangle over `i`, `m`, `k`; `None`
+    /// when there is none, or when it bends more than `limit`.
+    fn weigh(&self, table: &Table, i: usize, m: usize, k: usize, limit: f64) -> Option<(f64, f64)> {
         let (left, right) = (table.get(i, m)?, table.get(m, k)?);
         let mut bend = left.0.max(right.0);
+        if bend > limit {
+            return None;
+        }
         match self.normal(i, m, k) {
             None => bend = bend.max(NO_AREA),
             Some(normal) => {

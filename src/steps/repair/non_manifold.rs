@@ -102,7 +102,32 @@ fn spokes(draft: &Draft, a: VertexId, b: VertexId, group: &[(VertexId, HalfedgeI
         })
         .collect();
     spokes.sort_by(|s, t| s.angle.total_cmp(&t.angle).then(s.halfedge.cmp(&t.halfedge)));
+    settle_ties(&mut spokes);
     spokes
+}
+
+/// Orders faces that lie on each other, which their angles cannot do: a forward one comes first, then they take turns.
+///
+/// So a wall that two solids share is never taken for a sheet of material without thickness, and all the edges along
+/// it are paired alike: else the solids would be joined at some of them, and again at the halves of those when split.
+fn settle_ties(spokes: &mut [Spoke]) {
+    let is_gap = |s: &Spoke, t: &Spoke| {
+        let turn = (t.angle - s.angle).abs();
+        turn.min(TAU - turn) > SAME_ANGLE
+    };
+    let count = spokes.len();
+    // Faces that lie on each other may have angles on both sides of a full turn: begin after a gap.
+    let Some(start) = (0..count).find(|&i| is_gap(&spokes[(i + count - 1) % count], &spokes[i])) else { return };
+    spokes.rotate_left(start);
+    for tied in spokes.chunk_by_mut(|s, t| !is_gap(s, t)).filter(|tied| tied.len() > 1) {
+        tied.sort_by_key(|s| (!s.forward, s.halfedge));
+        let split = tied.iter().filter(|s| s.forward).count();
+        let (forward, backward) = tied.split_at(split);
+        let (first, second) = if split * 2 >= tied.len() { (forward, backward) } else { (backward, forward) };
+        let turns = |i: usize| [first.get(i), second.get(i)].into_iter().flatten().copied();
+        let ordered: Vec<Spoke> = (0..first.len()).flat_map(turns).collect();
+        tied.copy_from_slice(&ordered);
+    }
 }
 
 /// Pairs that enclose material, if the faces alternate in direction all the way round.

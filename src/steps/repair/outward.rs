@@ -1,4 +1,11 @@
 //! Closed components look outward, and those inside an odd number of others inward: they bound cavities.
+//!
+//! Inside means the whole surface: a component that meets another one anywhere is not inside it, and looks outward.
+//! Nothing in a file tells a cavity from debris within the material, whichever way its faces look: both count as
+//! cavities, so that the inside of the result is well defined, and `keep-components` drops what is too small to be meant.
+
+use std::cell::OnceCell;
+use std::ops::ControlFlow;
 
 use glam::DVec3;
 use robust::{Coord, Coord3D, orient2d, orient3d};
@@ -6,7 +13,10 @@ use robust::{Coord, Coord3D, orient2d, orient3d};
 use super::adjacency::Twins;
 use super::draft::Draft;
 use super::orient::turn;
+use crate::mesh::bvh::{Primitive, TriangleBvh};
+use crate::mesh::geometry::Aabb;
 use crate::mesh::id::Face;
+use crate::mesh::predicate::triangle_triangle;
 use crate::mesh::{FaceId, IdVec};
 
 /// What is known of a component of the draft.
@@ -28,8 +38,9 @@ pub(super) struct Part {
 pub(super) fn orient_outward(draft: &mut Draft, twins: &mut Twins, parts: &[Part]) -> (u64, u64) {
     let mut chosen: IdVec<Face, bool> = IdVec::filled(false, draft.faces.len());
     let (mut turned, mut cavities) = (0, 0);
-    for (i, part) in parts.iter().enumerate().filter(|(_, part)| part.closed) {
-        let is_cavity = depth(draft, parts, i) % 2 == 1;
+    let bodies: Vec<Body> = parts.iter().filter(|part| part.closed).map(Body::new).collect();
+    for (i, &Body { part, .. }) in bodies.iter().enumerate() {
+        let is_cavity = depth(draft, &bodies, i) % 2 == 1;
         cavities += u64::from(is_cavity);
         let volume = volume(draft, part);
         if (volume < 0.0) != is_cavity && volume != 0.0 {
@@ -55,46 +66,88 @@ fn volume(draft: &Draft, part: &Part) -> f64 {
         .sum()
 }
 
-/// Vertices of a component that must all be inside another one for it to count as nested. Bodies that run through each
-/// other have vertices on both sides.
+/// A closed component, with its tree of faces once somebody asks for it.
+struct Body<'a> {
+    part: &'a Part,
+    tree: OnceCell<TriangleBvh>,
+}
+
+impl<'a> Body<'a> {
+    fn new(part: &'a Part) -> Self {
+        Self { part, tree: OnceCell::new() }
+    }
+
+    fn tree(&self, draft: &Draft) -> &TriangleBvh {
+        self.tree.get_or_init(|| TriangleBvh::new(self.part.faces.iter().map(|&f| draft.corners(f)).collect()))
+    }
+
+    fn has_box_around(&self, inner: &Part) -> bool {
+        let outer = self.part;
+        outer.low.cmple(inner.low).all()
+            && inner.high.cmple(outer.high).all()
+            && (outer.low != inner.low || outer.high != inner.high)
+    }
+
+    /// Whether no face of the component meets this body's surface.
+    fn is_apart_from(&self, draft: &Draft, inner: &Part) -> bool {
+        let tree = self.tree(draft);
+        inner.faces.iter().all(|&f| {
+            let mine = draft.corners(f);
+            let visit = |_, other: &[DVec3; 3]| {
+                if triangle_triangle(mine, *other).is_intersection() {
+                    ControlFlow::Break(())
+                } else {
+                    ControlFlow::Continue(())
+                }
+            };
+            tree.for_each_in(&mine.bounds(), visit).is_continue()
+        })
+    }
+}
+
+/// Vertices of a component tried first: bodies that run through each other nearly always have vertices on both sides.
 const PROBES: usize = 24;
 
 /// How many closed components contain this one.
-fn depth(draft: &Draft, parts: &[Part], which: usize) -> usize {
-    let inner = &parts[which];
+fn depth(draft: &Draft, bodies: &[Body<'_>], which: usize) -> usize {
+    let inner = bodies[which].part;
     let stride = inner.faces.len().div_ceil(PROBES).max(1);
     let probes: Vec<DVec3> = inner.faces.iter().step_by(stride).map(|&f| draft.points[draft.faces[f][0]]).collect();
-    let contains = |outer: &Part| {
-        outer.closed
-            && outer.low.cmple(inner.low).all()
-            && inner.high.cmple(outer.high).all()
-            && (outer.low != inner.low || outer.high != inner.high)
+    let contains = |outer: &Body<'_>| {
+        outer.has_box_around(inner)
             && probes.iter().all(|&p| is_inside(draft, outer, p))
+            && outer.is_apart_from(draft, inner)
     };
-    parts.iter().enumerate().filter(|&(i, outer)| i != which && contains(outer)).count()
+    bodies.iter().enumerate().filter(|&(i, outer)| i != which && contains(outer)).count()
 }
 
-/// Whether a vertical ray from `point` leaves the component an odd number of times. A point on the surface is outside.
+/// Whether a vertical ray from `point` leaves the body an odd number of times. A point on the surface is outside.
 ///
 /// The faces are taken as half-open in the plane, so that a ray through an edge or a vertex counts once, and the side
 /// of the point is decided exactly.
-fn is_inside(draft: &Draft, part: &Part, point: DVec3) -> bool {
+fn is_inside(draft: &Draft, body: &Body<'_>, point: DVec3) -> bool {
+    let ray = Aabb::of([point, point.with_z(body.part.high.z)]);
     let mut crossings = 0_usize;
-    for &face in &part.faces {
-        let corners = draft.corners(face);
-        if corners.iter().all(|c| c.z < point.z) || !is_under(corners, point) {
-            continue;
+    let visit = |_, &corners: &[DVec3; 3]| match crosses(corners, point) {
+        None => ControlFlow::Break(()),
+        Some(is_crossing) => {
+            crossings += usize::from(is_crossing);
+            ControlFlow::Continue(())
         }
-        let [a, b, c] = corners.map(|p| Coord3D { x: p.x, y: p.y, z: p.z });
-        let side = orient3d(a, b, c, Coord3D { x: point.x, y: point.y, z: point.z });
-        if side == 0.0 {
-            return false;
-        }
-        // Positive means below a face that is counter-clockwise seen from above.
-        let facing = orient2d(flat(corners[0]), flat(corners[1]), flat(corners[2]));
-        crossings += usize::from((side > 0.0) == (facing > 0.0));
+    };
+    body.tree(draft).for_each_in(&ray, visit).is_continue() && crossings % 2 == 1
+}
+
+/// Whether the ray upwards from the point meets the triangle, or `None` when the point is on it.
+fn crosses(corners: [DVec3; 3], point: DVec3) -> Option<bool> {
+    if corners.iter().all(|c| c.z < point.z) || !is_under(corners, point) {
+        return Some(false);
     }
-    crossings % 2 == 1
+    let [a, b, c] = corners.map(|p| Coord3D { x: p.x, y: p.y, z: p.z });
+    let side = orient3d(a, b, c, Coord3D { x: point.x, y: point.y, z: point.z });
+    // Positive means below a face that is counter-clockwise seen from above.
+    let facing = orient2d(flat(corners[0]), flat(corners[1]), flat(corners[2]));
+    (side != 0.0).then_some((side > 0.0) == (facing > 0.0))
 }
 
 fn flat(p: DVec3) -> Coord<f64> {

@@ -170,11 +170,14 @@ fn umbrella(patch: &Patch, around: &Surroundings, neighbours: &[Vec<usize>], v: 
 
 /// Sweeps after which settling stops; each costs time proportional to the patch.
 const SWEEPS: usize = 2000;
+/// Vertices moved in all sweeps together, so that no hole takes longer than a few seconds. Large fills are less smooth.
+const MOST_MOVES: usize = 10_000_000;
 
 /// Gauss-Seidel sweeps with the given step until steps are a small share of the patch's extent.
 fn settle(patch: &mut Patch, step: impl Fn(&Patch, usize) -> DVec3) {
     let extent = patch.points.iter().map(|p| p.distance(patch.points[0])).fold(0.0, f64::max);
-    for _ in 0..SWEEPS {
+    let inner = patch.points.len() - patch.rim;
+    for _ in 0..SWEEPS.min(MOST_MOVES / inner.max(1)) {
         let mut largest = 0.0_f64;
         for v in patch.rim..patch.points.len() {
             let shift = step(patch, v);
