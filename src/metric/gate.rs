@@ -10,7 +10,7 @@ mod column;
 mod evaluate;
 mod fault;
 
-pub use evaluate::{GateError, evaluate};
+pub use evaluate::{GateError, evaluate, judges_faces};
 
 /// A bound of a check, as the recipe gives it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

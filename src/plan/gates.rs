@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::bind::BoundDecl;
 use super::case::CaseContext;
 use super::wire::{Producer, Wiring, producer};
-use crate::metric::gate::{Check, Limit};
+use crate::metric::gate::{Check, Limit, judges_faces};
 use crate::metric::registry::{METRICS, MetricDef, Needs, Unit, find};
 use crate::recipe::suggest::did_you_mean;
 use crate::recipe::{Diagnostic, Entry, Node, Table, Tree};
@@ -146,6 +146,11 @@ fn incomplete(metric: &MetricDef, entry: &Entry, check: &Check, compared: bool) 
     if !bounded && !check.same_as_reference && !check.no_more_than_reference {
         let message = format!("the check of `{name}` has no limit");
         let help = "give `at-least`, `at-most`, `equals`, `same-as` or `no-more-than`";
+        return Some(Diagnostic::error(entry.key, message).help(help));
+    }
+    if !check.except.is_empty() && !judges_faces(check) {
+        let message = format!("`except` leaves out faces, but this check of `{name}` does not judge faces one by one");
+        let help = "drop `except`, or check the least or largest value of a face, or an upper bound of `distance`";
         return Some(Diagnostic::error(entry.key, message).help(help));
     }
     None
