@@ -249,13 +249,11 @@ fn sides(metric: &str) -> Option<[bool; 2]> {
 pub fn judges_faces(check: &Check) -> bool {
     let nothing = Soup::default();
     let watch = Watch::silent();
-    match column(&Subject::new(&nothing, None, &watch), &check.metric) {
-        Some(column) => column.kind == FaultKind::Face,
-        None => {
-            let is_upper_bound = check.at_most.is_some() && check.at_least.is_none() && check.equals.is_none();
-            is_upper_bound && sides(&check.metric).is_some_and(|[own, _]| own)
-        }
+    if let Some(column) = column(&Subject::new(&nothing, None, &watch), &check.metric) {
+        return column.kind == FaultKind::Face;
     }
+    let is_upper_bound = check.at_most.is_some() && check.at_least.is_none() && check.equals.is_none();
+    is_upper_bound && sides(&check.metric).is_some_and(|[own, _]| own)
 }
 
 /// A distance is refined only until the comparison is decided.

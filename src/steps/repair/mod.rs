@@ -293,7 +293,7 @@ pub struct Step;
 
 impl crate::step::Step for Step {
     const NAME: &'static str = "repair";
-    const REVISION: u32 = 1;
+    const REVISION: u32 = 2;
     const INPUTS: &'static [InputDef] = &[InputDef {
         name: "from",
         accepts: &[Port::Soup, Port::Surface],
