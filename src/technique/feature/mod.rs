@@ -11,7 +11,7 @@
 //!
 //! With [`FeatureRules::voting_radius`] the angles are those between normals that the vote tensors of the
 //! neighbourhood have freed of noise; see `voting`. Corners are then turns over an arm of half that radius, because the
-//! edges of a scan zigzag along a crease, and connected sets of edges shorter than the radius are dropped.
+//! edges of a scan zigzag along a crease, and connected sets of edges shorter than twice the radius are dropped.
 //!
 //! Invariants: every corner ends a curve, no curve passes a corner; a second run on the result changes nothing.
 //! Faces without a reliable normal, being lower than a millionth of the diagonal, take that of the neighbour over
@@ -101,7 +101,7 @@ pub fn mark_features(surface: &Surface, rules: &FeatureRules, watch: &Watch) -> 
         let corners = match rules.voting_radius {
             None => curves.corners(rules.corner_angle),
             Some(radius) => {
-                report.dropped_chains += curves.drop_islands(radius);
+                report.dropped_chains += curves.drop_islands(2.0 * radius);
                 curves.corners_by_arm(rules.corner_angle, 0.5 * radius)
             }
         };

@@ -14,6 +14,9 @@
 //! normals jump, so the band shrinks to one line of edges, and a crease that fades out just ends. Faces that no front
 //! fits, as on ribs narrower than the radius, keep their own normal.
 //!
+//! A vertex also belongs to the band where votes that are not mirrored say so: mirrored votes agree on a rounded edge as
+//! they do on any cylinder, and scans round all edges. Slivers, whose normals mean nothing, take the mean around them.
+//!
 //! Geodesic distances are those along edges, and from the nearest corner to a face's centroid.
 //!
 //! # Cost
@@ -44,7 +47,9 @@ const ROUNDS: usize = 4;
 /// Normals at this distance (chord; 20 degrees) still mix with a weight of 0.6.
 const MIXING: f64 = 0.35;
 /// A front does not enter a face whose normal differs by more, in degrees.
-const MOST_TURN: f64 = 40.0;
+const MOST_TURN: f64 = 60.0;
+/// A face smaller than this share of its neighbours' mean has no normal worth keeping.
+const SLIVER: f64 = 0.2;
 /// Vertices a task; the scratch space of a task is as large as the mesh, but only touched where it works.
 const CHUNK: usize = 8192;
 
@@ -144,7 +149,8 @@ fn smooth_vertices(
                 watch.check()?;
             }
             reach.search(surface, fans, v, radius);
-            found.push(is_smooth(&votes(surface, v, &reach.faces, areas, normals, radius)));
+            let of = |mirrored| is_smooth(&votes(surface, v, &reach.faces, (areas, normals), radius, mirrored));
+            found.push(of(true) && of(false));
         }
         Ok(found)
     };
@@ -157,9 +163,9 @@ fn votes(
     surface: &Surface,
     v: VertexId,
     faces: &[(FaceId, f64)],
-    areas: &IdVec<Face, f64>,
-    normals: &IdVec<Face, DVec3>,
+    (areas, normals): (&IdVec<Face, f64>, &IdVec<Face, DVec3>),
     radius: f64,
+    mirrored: bool,
 ) -> Symmetric {
     let here = surface.points[v];
     let largest = faces.iter().map(|&(f, _)| areas[f]).fold(f64::MIN_POSITIVE, f64::max);
@@ -167,7 +173,8 @@ fn votes(
     for &(f, distance) in faces {
         let u = (centroid(surface.corners(f)) - here).normalize_or_zero();
         let normal = normals[f];
-        let [x, y, z] = (normal - 2.0 * normal.dot(u) * u).to_array();
+        let vote = if mirrored { normal - 2.0 * normal.dot(u) * u } else { normal };
+        let [x, y, z] = vote.to_array();
         let weight = areas[f] / largest * libm::exp(-3.0 * distance / radius);
         for (sum, product) in tensor.iter_mut().zip([x * x, x * y, x * z, y * y, y * z, z * z]) {
             *sum += weight * product;
@@ -192,9 +199,12 @@ fn denoised(
     let all: Vec<FaceId> = surface.faces.ids().collect();
     let of = |&f: &FaceId| {
         let own = normals[f];
+        let around = || surface.faces[f].iter().flat_map(|&v| fans.of(v));
+        let is_sliver = areas[f] * (around().count() as f64) < SLIVER * around().map(|&g| areas[g]).sum::<f64>();
         let mut sum = DVec3::ZERO;
-        for &g in surface.faces[f].iter().flat_map(|&v| fans.of(v)) {
-            let weight = libm::exp(-normals[g].distance_squared(own) / (2.0 * MIXING * MIXING));
+        for &g in around() {
+            let weight =
+                if is_sliver { 1.0 } else { libm::exp(-normals[g].distance_squared(own) / (2.0 * MIXING * MIXING)) };
             sum += areas[g] * weight * normals[g];
         }
         sum.try_normalize().unwrap_or(own)
