@@ -73,18 +73,13 @@ fn inputs() -> Vec<(&'static str, Artifact)> {
         run("features", "angle = 35", &top).artifact
     };
     let broken = shapes::duplicate_face(shapes::flipped_face(shapes::hole(shapes::sphere(1), 9), 3), 4);
-    let levels = |mesh: &meshmill::mesh::Soup| {
-        let from = [("from", step::surface(shapes::surface(mesh)))];
-        let parameters = "tolerance = \"2%\", tolerance-mode = \"quadric-rms\"";
-        run_locked("control-properties", "hierarchy", parameters, "", &from).unwrap().artifact
-    };
     let mut inputs: Vec<_> = shapes::STANDARD.iter().map(|(name, shape)| (*name, step::soup(shape()))).collect();
     inputs.extend([
         ("plates.obj", step::file("plates.obj", text)),
         ("broken-sphere", step::soup(broken)),
         ("named-cylinder", named(&shapes::cylinder(20, 3))),
         ("named-grid", named(&shapes::grid(7))),
-        ("levels-of-a-sphere", levels(&shapes::sphere(3))),
+        ("levels-of-a-sphere", step::levels(&shapes::sphere(3))),
     ]);
     inputs
 }

@@ -8,6 +8,9 @@ mod snapshot;
 mod step;
 
 mod steps {
+    mod adapt_curvature;
+    mod adapt_density;
+    mod adapt_region;
     mod control_properties;
     mod example;
     mod features;
@@ -17,6 +20,7 @@ mod steps {
     mod read;
     mod refine;
     mod repair;
+    mod resolution;
     mod select;
     mod subdivide;
 }

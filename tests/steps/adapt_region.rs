@@ -1,0 +1,14 @@
+//! Adapt-region: one half of a sphere is fine.
+
+use super::golden::golden;
+use crate::shapes;
+use crate::step::levels;
+
+#[test]
+fn the_upper_half_of_a_sphere() {
+    let parameters = "size = \"9%\", half-spaces = [{ point = [0, 0, 0.1], normal = [0, 0, 1] }]";
+    let made = golden("adapt-region", "upper half of a sphere", parameters, &levels(&shapes::sphere(3)));
+    let mesh = made.artifact.as_surface().unwrap();
+    let above = mesh.points.iter().filter(|p| p.z > 0.1).count();
+    assert!(above * 2 > mesh.points.len(), "{above} of {}", mesh.points.len());
+}
