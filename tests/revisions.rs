@@ -4,6 +4,8 @@
 //! The test fails when a hash moves and the revision does not. After raising `REVISION` (and a line in the changelog)
 //! `UPDATE_REVISIONS=1 cargo test --test revisions` records the new hashes; it refuses to do so without.
 
+#[path = "common/levels.rs"]
+mod levels;
 #[path = "common/shapes.rs"]
 mod shapes;
 #[path = "common/step.rs"]
@@ -79,7 +81,7 @@ fn inputs() -> Vec<(&'static str, Artifact)> {
         ("broken-sphere", step::soup(broken)),
         ("named-cylinder", named(&shapes::cylinder(20, 3))),
         ("named-grid", named(&shapes::grid(7))),
-        ("levels-of-a-sphere", step::levels(&shapes::sphere(3))),
+        ("levels-of-a-sphere", levels::levels(&shapes::sphere(3))),
     ]);
     inputs
 }

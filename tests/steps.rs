@@ -1,5 +1,7 @@
 //! Every step on generated shapes: golden statistics and metrics, the invariants of its head comment, its example.
 
+#[path = "common/levels.rs"]
+mod levels;
 #[path = "common/shapes.rs"]
 mod shapes;
 #[path = "common/snapshot.rs"]

@@ -47,13 +47,6 @@ pub(crate) fn check(artifact: &Artifact, what: &str) {
     }
 }
 
-/// The hierarchy that property control by quadrics records of a mesh.
-pub(crate) fn levels(mesh: &Soup) -> Artifact {
-    let from = [("from", surface(crate::shapes::surface(mesh)))];
-    let parameters = "tolerance = \"2%\", tolerance-mode = \"quadric-rms\"";
-    run_locked("control-properties", "hierarchy", parameters, "", &from).unwrap_or_else(|e| panic!("{e}")).artifact
-}
-
 pub(crate) fn soup(mesh: Soup) -> Artifact {
     Artifact::Soup(Arc::new(mesh))
 }

@@ -1,8 +1,8 @@
 //! Adapt-curvature: a torus is fine where it bends.
 
 use super::golden::golden;
+use crate::levels::levels;
 use crate::shapes;
-use crate::step::levels;
 
 #[test]
 fn a_torus() {

@@ -1,8 +1,8 @@
 //! Adapt-density: fewer faces, spread as before.
 
 use super::golden::golden;
+use crate::levels::levels;
 use crate::shapes;
-use crate::step::levels;
 
 #[test]
 fn a_third_of_a_sphere() {

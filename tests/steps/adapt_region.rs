@@ -1,8 +1,8 @@
 //! Adapt-region: one half of a sphere is fine.
 
 use super::golden::golden;
+use crate::levels::levels;
 use crate::shapes;
-use crate::step::levels;
 
 #[test]
 fn the_upper_half_of_a_sphere() {

@@ -3,8 +3,9 @@
 use std::sync::Arc;
 
 use super::golden::golden;
+use crate::levels::levels;
 use crate::shapes;
-use crate::step::{levels, run};
+use crate::step::run;
 use meshmill::step::Artifact;
 
 #[test]
