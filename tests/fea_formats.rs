@@ -73,6 +73,37 @@ fn vtu_and_vtk_bring_everything_back() {
 }
 
 #[test]
+fn lz4_blocks_are_read() {
+    // Text, but for the points: one block of 72 bytes for three points.
+    let points: Vec<u8> =
+        [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0_f64].iter().flat_map(|x| x.to_le_bytes()).collect();
+    let packed = lz4_flex::block::compress(&points);
+    let array = |name: &str, kind: &str, values: &str| {
+        format!("<DataArray type=\"{kind}\" Name=\"{name}\" format=\"ascii\">{values}</DataArray>")
+    };
+    let cells = [array("connectivity", "Int64", "0 1 2"), array("offsets", "Int64", "3"), array("types", "UInt8", "5")];
+    let mut file = format!(
+        "<VTKFile type=\"UnstructuredGrid\" byte_order=\"LittleEndian\" header_type=\"UInt32\" \
+         compressor=\"vtkLZ4DataCompressor\"><UnstructuredGrid><Piece NumberOfPoints=\"3\" NumberOfCells=\"1\"><Points>\
+         <DataArray type=\"Float64\" NumberOfComponents=\"3\" format=\"appended\" offset=\"0\"/></Points><Cells>{}</Cells>\
+         </Piece></UnstructuredGrid><AppendedData encoding=\"raw\">_",
+        cells.concat()
+    )
+    .into_bytes();
+    let head = file.len();
+    for number in [1, 72, 0, packed.len() as u32] {
+        file.extend(number.to_le_bytes());
+    }
+    file.extend(packed);
+    file.extend(b"</AppendedData></VTKFile>");
+    let soup = read(Format::Vtu, &file).expect("a good file");
+    assert_eq!(soup.points.as_slice(), [DVec3::ZERO, DVec3::X, DVec3::Y]);
+    // A block that is said to be larger than it is.
+    file[head + 4] += 1;
+    assert!(read(Format::Vtu, &file).is_err());
+}
+
+#[test]
 fn second_order_vtu_reads_back_as_its_corners() {
     let soup = rich_sample();
     let options = WriteOptions { element: Some(Element::S6), ..text() };

@@ -1,10 +1,10 @@
-//! The numbers of a `DataArray` element: text, base64 or raw, plain or in zlib blocks, in the file's byte order.
+//! The numbers of a `DataArray` element: text, base64 or raw, plain or in zlib or LZ4 blocks, in the file's byte order.
 //!
 //! A binary array begins with a head of 32- or 64-bit numbers: its size in bytes, or for compressed data the number of
 //! blocks, the size of a block, the size of the last block (0: it is whole), and the compressed size of each. In
 //! base64 the head may be padded on its own or run into the data; the reader takes both.
 //!
-//! What an array may hold is bounded before anything is allocated: by the bytes that are there, and for zlib by a
+//! What an array may hold is bounded before anything is allocated: by the bytes that are there, and where packed by a
 //! budget of 256 times the file (at least 64 MB) over all its arrays, block by block.
 
 use std::io::Read;
@@ -32,14 +32,35 @@ pub(super) struct Encoding<'a> {
     pub(super) order: ByteOrder,
     /// Whether numbers in heads have 64 bits.
     pub(super) wide_heads: bool,
-    /// Whether binary data is in zlib blocks.
-    pub(super) compressed: bool,
+    /// How the blocks of binary data are packed, where they are.
+    pub(super) packing: Option<Packing>,
     /// The whole file.
     pub(super) bytes: &'a [u8],
     /// Appended data, where there is some.
     pub(super) appended: Option<Appended>,
     /// How many bytes decompression may still give.
     pub(super) budget: u64,
+}
+
+/// The compressors whose blocks can be read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Packing {
+    Zlib,
+    Lz4,
+}
+
+impl Packing {
+    /// Appends the unpacked block, if it is whole and has exactly `unpacked` bytes.
+    fn unpack(self, packed: &[u8], unpacked: u64, all: &mut Vec<u8>) -> Option<()> {
+        let before = all.len();
+        match self {
+            Self::Zlib => {
+                ZlibDecoder::new(packed).take(unpacked).read_to_end(all).ok()?;
+            }
+            Self::Lz4 => all.extend(lz4_flex::block::decompress(packed, usize::try_from(unpacked).ok()?).ok()?),
+        }
+        ((all.len() - before) as u64 == unpacked).then_some(())
+    }
 }
 
 /// The types of numbers that a file may hold.
@@ -180,8 +201,8 @@ impl<'a> Encoding<'a> {
         if source.is_blank() {
             return decode(&[], number, self.order, place);
         }
-        let bytes = if self.compressed {
-            self.inflate(&mut source)?
+        let bytes = if let Some(packing) = self.packing {
+            self.inflate(packing, &mut source)?
         } else {
             let size = self.heads(&mut source, 1)?[0];
             source.take(size)?
@@ -197,7 +218,7 @@ impl<'a> Encoding<'a> {
         (0..count).map(|_| next()).collect()
     }
 
-    fn inflate(&mut self, source: &mut Source<'_>) -> Result<Vec<u8>, FormatError> {
+    fn inflate(&mut self, packing: Packing, source: &mut Source<'_>) -> Result<Vec<u8>, FormatError> {
         let place = source.place();
         let fixed = self.heads(source, 3)?;
         let [blocks, size, last] = [fixed[0], fixed[1], fixed[2]];
@@ -213,11 +234,8 @@ impl<'a> Encoding<'a> {
             self.budget -= unpacked;
             let at = source.place();
             let packed = source.take(packed)?;
-            let before = all.len();
-            let read = ZlibDecoder::new(packed.as_slice()).take(unpacked).read_to_end(&mut all);
-            if read.is_err() || (all.len() - before) as u64 != unpacked {
-                return Err(FormatError::new(at, Reason::Truncated { within: "a zlib block" }));
-            }
+            let whole = packing.unpack(&packed, unpacked, &mut all);
+            whole.ok_or_else(|| FormatError::new(at, Reason::Truncated { within: "a compressed block" }))?;
         }
         Ok(all)
     }

@@ -4,7 +4,7 @@
 //! chapter 12). What the arrays mean is told in the model that the legacy format shares: groups, regions and fields
 //! come back as they were.
 //!
-//! Reading takes text, base64 inline and appended data in base64 or raw, zlib blocks, both byte orders and both widths
+//! Reading takes text, base64 inline and appended data in base64 or raw, zlib and LZ4 blocks, both byte orders and both widths
 //! of heads, several pieces, and all cell types: first and second order triangles and quads, polygons, strips and
 //! pixels are faces, lines are members of edge groups, volumes are left out.
 //!
@@ -30,7 +30,7 @@ use super::vtk::model::{Array, DataSet, cell};
 use super::{FormatDef, ReadCounts};
 use crate::mesh::Soup;
 use crate::watch::Watch;
-use data::{Appended, Encoding};
+use data::{Appended, Encoding, Packing};
 
 pub(super) const DEF: FormatDef =
     FormatDef { name: "vtu", title: "VTK XML", endings: &["vtu", "vtp"], sniff, read, write: write::write };
@@ -122,9 +122,10 @@ fn encoding<'a>(root: Node<'_, '_>, bytes: &'a [u8], appended: Option<Appended>)
         Some("UInt64") => true,
         Some(other) => return Err(FormatError::unexpected(place(root), "UInt32 or UInt64", other.as_bytes())),
     };
-    let compressed = match root.attribute("compressor") {
-        None | Some("") => false,
-        Some("vtkZLibDataCompressor") => true,
+    let packing = match root.attribute("compressor") {
+        None | Some("") => None,
+        Some("vtkZLibDataCompressor") => Some(Packing::Zlib),
+        Some("vtkLZ4DataCompressor") => Some(Packing::Lz4),
         Some(other) => {
             return Err(FormatError::new(place(root), Reason::Unsupported(format!("the compressor {other}")))
                 .with_remedy("write the file uncompressed or with vtkZLibDataCompressor"));
@@ -132,7 +133,7 @@ fn encoding<'a>(root: Node<'_, '_>, bytes: &'a [u8], appended: Option<Appended>)
     };
     // No mesh is packed more tightly than this; the least is for small files of constant arrays.
     let budget = (bytes.len() as u64).saturating_mul(256).max(1 << 26);
-    Ok(Encoding { order, wide_heads, compressed, bytes, appended, budget })
+    Ok(Encoding { order, wide_heads, packing, bytes, appended, budget })
 }
 
 fn arrays(node: Node<'_, '_>, encoding: &mut Encoding<'_>) -> Result<Vec<Array>, FormatError> {
