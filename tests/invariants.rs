@@ -1,5 +1,7 @@
 //! What holds for every mesh and every parameter, tried on random small ones: topology, counts, shape, thresholds.
 
+#[path = "common/levels.rs"]
+mod levels;
 #[path = "common/shapes.rs"]
 mod shapes;
 #[path = "common/step.rs"]
@@ -26,7 +28,7 @@ fn config(cases: u32) -> Config {
 
 /// A standard shape, manifold and oriented, with every vertex moved by up to `wobble`.
 fn surfaces(wobble: f64) -> impl Strategy<Value = Surface> {
-    let shape = (0..10_usize).prop_map(|which| shapes::surface(&(shapes::STANDARD[which].1)()));
+    let shape = (0..11_usize).prop_map(|which| shapes::surface(&(shapes::STANDARD[which].1)()));
     let shaken = shape.prop_flat_map(|surface| {
         let moves = prop::collection::vec(prop::array::uniform3(-1.0..1.0), surface.points.len());
         (Just(surface), moves)
@@ -257,8 +259,19 @@ proptest! {
 }
 
 #[test]
+fn every_level_of_a_hierarchy_keeps_topology() {
+    for (mesh, expected) in [(shapes::sphere(3), (2, 0)), (shapes::torus(24, 12), (0, 0))] {
+        let record = levels::levels(&mesh);
+        for share in [10, 40, 70, 100] {
+            let cut = run("resolution", &format!("share = \"{share}%\""), &record).artifact;
+            assert_eq!(topology(cut.as_surface().expect("a surface")), expected, "{share}%");
+        }
+    }
+}
+
+#[test]
 fn marks_and_counts_of_features_do_not_depend_on_scale_or_place() {
-    for (name, shape) in shapes::STANDARD.iter().take(10) {
+    for (name, shape) in shapes::STANDARD.iter().take(11) {
         let surface = shapes::surface(&shape());
         let stats = |map: &dyn Fn(DVec3) -> DVec3| {
             let points = surface.points.iter().map(|&p| map(p)).collect();

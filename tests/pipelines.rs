@@ -1,5 +1,9 @@
 //! The shipped pipelines, run as a newcomer runs them: golden metrics and gates, and files that read back sound.
 
+#![expect(clippy::print_stderr, reason = "a skipped test says so")]
+
+#[path = "common/corpus.rs"]
+mod corpus;
 #[path = "common/snapshot.rs"]
 mod snapshot;
 
@@ -98,6 +102,27 @@ fn shipped_pipelines_give_the_golden_metrics_and_sound_files() {
         let results = meshes.iter().filter(|(file, _)| file.starts_with("result."));
         let sizes: BTreeSet<_> = results.map(|(_, mesh)| (mesh.points.len(), mesh.faces.len())).collect();
         assert_eq!(sizes.len(), 1, "{name}: the files differ in size: {sizes:?}");
+    }
+}
+
+#[test]
+fn looking_and_repairing_take_every_small_part_of_the_corpus() {
+    let Some(folder) = corpus::corpus("cad") else { return };
+    let entries = fs::read_dir(folder).expect("the parts").map(|entry| entry.expect("an entry").path());
+    // Scans of millions of faces are for the acceptance table, which is built for speed.
+    let small = |part: &PathBuf| fs::metadata(part).is_ok_and(|file| file.len() < 4_000_000);
+    let stl = |part: &PathBuf| part.extension().is_some_and(|ending| ending == "stl");
+    let mut parts: Vec<_> = entries.filter(|part| stl(part) && small(part)).collect();
+    parts.sort();
+    assert!(!parts.is_empty());
+    for part in parts {
+        for pipeline in ["inspect", "repair"] {
+            let run = Run::of(&root().join(format!("pipelines/{pipeline}.toml")), Some(&part));
+            for (file, mesh) in run.meshes() {
+                let sound = holds(&mesh, "manifold") && holds(&mesh, "oriented");
+                assert!(sound, "{}: {file} of {pipeline} is no surface", part.display());
+            }
+        }
     }
 }
 

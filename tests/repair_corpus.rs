@@ -2,6 +2,9 @@
 
 #![expect(clippy::print_stderr, reason = "a skipped test says so")]
 
+#[path = "common/corpus.rs"]
+mod corpus;
+
 use meshmill::format::{Format, read};
 use meshmill::mesh::Surface;
 use meshmill::mesh::validate::validate_surface;
@@ -11,11 +14,7 @@ use meshmill::watch::Watch;
 
 /// Repairs a file and checks that the result is valid and stays as it is; `None`, said so, without a corpus.
 fn repaired(name: &str, params: &RepairParams) -> Option<(Surface, RepairStats)> {
-    let Some(folder) = std::env::var_os("MESHMILL_CORPUS") else {
-        eprintln!("skipped {name}: MESHMILL_CORPUS names no folder of meshes");
-        return None;
-    };
-    let bytes = std::fs::read(std::path::Path::new(&folder).join(name)).expect("a file of the corpus");
+    let bytes = std::fs::read(corpus::corpus(name)?).expect("a file of the corpus");
     let format = Format::detect(name, &bytes).expect("a known format");
     let soup = read(format, &bytes, &Watch::silent()).expect("a good file").0;
     drop(bytes);

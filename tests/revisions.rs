@@ -32,6 +32,7 @@ const CASES: &[(&str, &str, &str)] = &[
     ("select", "name = \"up\", of = \"edges\", normal = { direction = [0, 0, 1] }", ""),
     ("features", "", ""),
     ("features", "angle = 12, corner-angle = 20", ""),
+    ("remove-features", "max-diameter = 0.8", ""),
     ("subdivide", "", "boundary = \"exact\""),
     ("refine", "max-edge = \"7%\"", ""),
     ("refine", "max-edge = \"9%\"", "keep = [\"top\"]"),
@@ -80,6 +81,7 @@ fn inputs() -> Vec<(&'static str, Artifact)> {
         ("plates.obj", step::file("plates.obj", text)),
         ("broken-sphere", step::soup(broken)),
         ("named-cylinder", named(&shapes::cylinder(20, 3))),
+        ("named-washer", named(&shapes::washer(20))),
         ("named-grid", named(&shapes::grid(7))),
         ("levels-of-a-sphere", levels::levels(&shapes::sphere(3))),
     ]);

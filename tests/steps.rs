@@ -21,6 +21,7 @@ mod steps {
     mod measure;
     mod read;
     mod refine;
+    mod remove_features;
     mod repair;
     mod resolution;
     mod select;

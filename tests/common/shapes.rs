@@ -18,6 +18,7 @@ pub(crate) const STANDARD: &[Named] = &[
     ("sphere", || sphere(2)),
     ("torus", || torus(16, 8)),
     ("cylinder", || cylinder(16, 4)),
+    ("washer", || washer(20)),
     ("grid", || grid(6)),
     ("fan", || fan(7)),
     ("grid-with-a-hole", || hole(grid(6), 30)),
@@ -126,6 +127,15 @@ pub(crate) fn cylinder(n: usize, layers: usize) -> Soup {
     let mut points = side.points.into_vec();
     points.extend([DVec3::ZERO, DVec3::Z * 4.0]);
     triangles(points, &all)
+}
+
+/// A disc of radius 2 and height 1 with a hole of radius 0.3, of `n` facets each.
+pub(crate) fn washer(n: usize) -> Soup {
+    let profile = [(2.0, -0.5), (2.0, 0.5), (0.3, 0.5), (0.3, -0.5)];
+    sheet(n, 4, [true; 2], |u, v| {
+        let (radius, z) = profile[(4.0 * v) as usize % 4];
+        dvec3(radius * libm::cos(TAU * u), radius * libm::sin(TAU * u), z)
+    })
 }
 
 /// `n` triangles round a vertex, a half turn wide.

@@ -17,6 +17,7 @@ use crate::shapes;
 const BEFORE: &str = "[inputs]\npart = \"part.obj\"\n\
     [steps.raw]\nuse = \"read\"\nfile = \"=inputs.part\"\n\
     [steps.clean]\nuse = \"repair\"\nfrom = \"raw\"\n\
+    [steps.marked]\nuse = \"features\"\nfrom = \"clean\"\n\
     [steps.fe]\nuse = \"control-properties\"\nfrom = \"clean\"\n";
 
 /// A slender bar as an OBJ file: small steps in percent of its diagonal stay few.

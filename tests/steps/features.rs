@@ -37,7 +37,7 @@ fn a_coarse_cylinder_makes_the_angle_doubtful() {
 
 #[test]
 fn points_and_faces_stay_and_a_second_run_changes_nothing() {
-    for (name, shape) in shapes::STANDARD.iter().take(10) {
+    for (name, shape) in shapes::STANDARD.iter().take(11) {
         let plain = of(&shape());
         let once = run("features", "", &plain).artifact;
         let twice = run("features", "", &once).artifact;
