@@ -100,7 +100,7 @@ fn run(recipe: &str, part: &Path, out: &Path, cache: &Path, sets: &[String]) -> 
 fn load(path: &Path) -> Option<Soup> {
     let bytes = std::fs::read(path).ok()?;
     let format = Format::detect(&path.to_string_lossy(), &bytes).ok()?;
-    read(format, &bytes, &Watch::silent()).ok().map(|done| done.soup)
+    read(format, &bytes, &Watch::silent()).ok().map(|(soup, _)| soup)
 }
 
 fn number(table: &Measurement, name: &str) -> f64 {
