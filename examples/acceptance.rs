@@ -115,8 +115,21 @@ fn fe_surface(wanted: &[String]) -> bool {
     };
     println!(
         "{:24} {:>8} {:>8} {:>4} {:>6} {:>4} {:>8} {:>8} {:>4} {:>6} {:>7} {:>9} {:>8} {:>7} {:>7}  verdict",
-        "part", "faces in", "out", "exit", "closed", "chi", "min st", "mean st", "low", "size %", "valence", "dist. %",
-        "new s.i.", "run s", "again s"
+        "part",
+        "faces in",
+        "out",
+        "exit",
+        "closed",
+        "chi",
+        "min st",
+        "mean st",
+        "low",
+        "size %",
+        "valence",
+        "dist. %",
+        "new s.i.",
+        "run s",
+        "again s"
     );
     let mut all_hold = true;
     for part in parts.iter().filter(|part| is_wanted(part, wanted)) {

@@ -170,7 +170,7 @@ pub fn one_sided(from: &Target, to: &Target, watch: &Watch) -> Result<Option<One
         reach(d, p, from.cut.origin[t as usize]);
     }
     let slack = (SLACK_OF_DIAGONAL * to.bvh.bounds().diagonal()).max(SLACK_OF_DISTANCE * farthest.0);
-    let limits = Limits::new(farthest.0 + slack, slack, f64::INFINITY, from.triangles.len(), to);
+    let limits = Limits::new(farthest.0 + slack, slack, f64::INFINITY, to);
     let refined = refine_all(from, to, &corners, &limits, watch)?;
     let mut upper = farthest.0;
     for (t, bound) in refined.iter().enumerate() {
@@ -202,11 +202,13 @@ fn refine_all(
     limits: &Limits,
     watch: &Watch,
 ) -> Result<Vec<piece::Bound>, Cancelled> {
+    let total: f64 = summary::sum(from.triangles.iter().map(|&t| triangle_area(t)));
     let judge = |t: usize| {
         if watch.is_cancelled() {
             return piece::Bound::default();
         }
-        refine(from.cut.corners[t].map(|v| (from.points[v], corners[v.index()])), to, limits)
+        let share = if total > 0.0 { triangle_area(from.triangles[t]) / total } else { 0.0 };
+        refine(from.cut.corners[t].map(|v| (from.points[v], corners[v.index()])), to, limits, share)
     };
     let bounds = (0..from.triangles.len()).into_par_iter().map(judge).collect();
     watch.check()?;
@@ -235,7 +237,7 @@ pub fn decide(from: &Target, to: &Target, threshold: f64, watch: &Watch) -> Resu
     let corners = corner_distances(from, to);
     watch.check()?;
     let threshold = threshold * (1.0 + 1e-9) + rounding(from, to);
-    let limits = Limits::new(threshold, 0.0, threshold, from.triangles.len(), to);
+    let limits = Limits::new(threshold, 0.0, threshold, to);
     let refined = refine_all(from, to, &corners, &limits, watch)?;
     let mut out = Decision { holds: true, beyond: Vec::new(), undecided: Vec::new(), upper: 0.0 };
     for (t, bound) in refined.iter().enumerate() {

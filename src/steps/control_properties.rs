@@ -290,7 +290,7 @@ fn rules(params: &ControlPropertiesParams) -> CollapseRules {
     CollapseRules {
         min_stretch: params.min_stretch,
         mean_stretch: 0.0,
-        must_improve: false,
+        mend_below: None,
         order: if is_certified { Order::OnSurface } else { Order::Printed },
         priority: Priority::SmallFirst { size: 1.0 },
     }

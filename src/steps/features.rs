@@ -61,6 +61,9 @@ pub struct FeaturesParams {
     /// Whether the principal curvatures go along as vertex fields `curvature-max` and `curvature-min`, in 1/length and
     /// positive where convex; `max` is the larger magnitude. Averaged over balls of 2.5 mean edges. Default false.
     pub curvature: bool,
+    /// Of curves that run alongside each other within this distance only the sharpest is marked: closer pairs would
+    /// force slivers between them. Default 0.1 % of the diagonal; 0 marks all.
+    pub min_gap: Length,
 }
 
 impl Default for FeaturesParams {
@@ -73,6 +76,7 @@ impl Default for FeaturesParams {
             method: FeatureMethod::Dihedral,
             radius: None,
             curvature: false,
+            min_gap: Length::Percent(0.1),
         }
     }
 }
@@ -98,6 +102,8 @@ pub struct FeaturesStats {
     pub grown_edges: usize,
     /// Sharp chains that were dropped as too short.
     pub dropped_chains: usize,
+    /// Sharp edges left out because they ran alongside a sharper curve, nearer than `min-gap`.
+    pub alongside_edges: usize,
     /// Edges on rims.
     pub rim_edges: usize,
     /// Edges on borders of regions or face groups that are neither sharp nor on a rim.
@@ -153,6 +159,7 @@ pub fn features(
         corner_angle: params.corner_angle.0,
         region_borders: params.region_borders,
         voting_radius: voting_radius(surface, params)?,
+        gap: params.min_gap.resolve(Aabb::of(surface.points.iter().copied()).diagonal()),
     };
     watch.phase("marking features", None);
     let (mut marked, report) = mark_features(surface, &rules, watch)?;
@@ -187,6 +194,7 @@ fn stats(report: &Report, angle: f64) -> FeaturesStats {
         sharp_edges: report.sharp_edges,
         grown_edges: report.grown_edges,
         dropped_chains: report.dropped_chains,
+        alongside_edges: report.alongside_edges,
         rim_edges: report.rim_edges,
         border_edges: report.border_edges,
         curves: report.curves,

@@ -286,7 +286,7 @@ fn rules(params: &ImproveQualityParams) -> CollapseRules {
     CollapseRules {
         min_stretch: FLOOR,
         mean_stretch: 0.0,
-        must_improve: false,
+        mend_below: None,
         order: if is_certified { Order::OnSurface } else { Order::Printed },
         priority: Priority::QualityGain,
     }

@@ -14,21 +14,18 @@ pub(super) struct Limits {
     slack: f64,
     /// A face that reaches more than this is settled.
     give_up: f64,
-    /// Pieces a face.
-    pieces: usize,
     /// A piece of a smaller radius is not cut.
     radius: f64,
 }
 
-/// Pieces over all faces, and the least and most for one: keeps the worst case within a minute.
-const ALL_PIECES: usize = 20_000_000;
-const FEWEST: usize = 256;
-const MOST: usize = 200_000;
+/// Pieces for a face that is the whole area, and for any: a large face may lie over all faces of the other mesh, so work
+/// goes by area. Keeps the worst case within minutes; a usual face needs one piece, or ten.
+const PIECES_BY_AREA: f64 = 40e6;
+const FEWEST: usize = 2048;
 
 impl Limits {
-    pub(super) fn new(accept: f64, slack: f64, give_up: f64, faces: usize, to: &Target) -> Self {
-        let pieces = (ALL_PIECES / faces.max(1)).clamp(FEWEST, MOST);
-        Self { accept, slack, give_up, pieces, radius: 1e-10 * to.bvh.bounds().diagonal() }
+    pub(super) fn new(accept: f64, slack: f64, give_up: f64, to: &Target) -> Self {
+        Self { accept, slack, give_up, radius: 1e-10 * to.bvh.bounds().diagonal() }
     }
 }
 
@@ -80,7 +77,9 @@ fn bound_by_corners(piece: &Piece, to: &Target) -> f64 {
 }
 
 /// Bounds the largest distance of a face with these corners, each given with its squared distance and nearest triangle.
-pub(super) fn refine(corners: [(DVec3, (f64, u32)); 3], to: &Target, limits: &Limits) -> Bound {
+/// `share` is the face's part of its mesh's area.
+pub(super) fn refine(corners: [(DVec3, (f64, u32)); 3], to: &Target, limits: &Limits, share: f64) -> Bound {
+    let most_pieces = FEWEST + (share * PIECES_BY_AREA) as usize;
     let mut bound = Bound { at: corners[0].0, ..Bound::default() };
     let first: Piece = corners
         .iter()
@@ -107,7 +106,7 @@ pub(super) fn refine(corners: [(DVec3, (f64, u32)); 3], to: &Target, limits: &Li
         let Some(found) = to.bvh.closest(centre) else { break };
         bound.reach(found.distance(), centre);
         let best = by_corners.min(found.distance() + radius).min(to_triangle(&piece, to, found.index));
-        if best <= accept || radius <= limits.radius || seen >= limits.pieces {
+        if best <= accept || radius <= limits.radius || seen >= most_pieces {
             bound.upper = bound.upper.max(best);
             continue;
         }

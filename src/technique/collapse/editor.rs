@@ -33,8 +33,8 @@ pub struct CollapseRules {
     pub min_stretch: f64,
     /// Least mean stretch of the new faces; where the mean of the old star is below it, no less than that.
     pub mean_stretch: f64,
-    /// Whether the least stretch of the star must rise.
-    pub must_improve: bool,
+    /// Where given, the star must come nearer to this stretch: see [`Tally::mends`].
+    pub mend_below: Option<f64>,
     /// Candidate order.
     pub order: Order,
     /// The index of an admitted collapse.
@@ -205,7 +205,7 @@ impl<'a> Editor<'a> {
     /// The index of the edge's collapse where cheap tests admit one; `None` where not.
     pub fn rate_collapse(&mut self, edge: EdgeId, rules: &CollapseRules) -> Option<f32> {
         let plan = check_collapse(&self.mesh, edge).ok()?;
-        let (site, before) = self.prepare_collapse(&plan)?;
+        let (site, before) = self.prepare_collapse(&plan, rules)?;
         let found = site.candidates(rules.order).find_map(|p| self.assess(&plan, &site, &before, p, rules));
         found.map(|after| rules.priority.index(&before, &after))
     }
@@ -213,7 +213,7 @@ impl<'a> Editor<'a> {
     /// Collapses the edge where all tests admit it; the first candidate that passes wins.
     pub fn try_collapse(&mut self, edge: EdgeId, rules: &CollapseRules) -> Option<VertexId> {
         let plan = check_collapse(&self.mesh, edge).ok()?;
-        let (site, before) = self.prepare_collapse(&plan)?;
+        let (site, before) = self.prepare_collapse(&plan, rules)?;
         let mut last = None;
         for p in site.candidates(rules.order) {
             let p = plan.placement.nearest(p);
@@ -230,7 +230,7 @@ impl<'a> Editor<'a> {
     }
 
     /// Fills the patch with the star of the edge; the merged vertex's corner comes first in each new face.
-    fn prepare_collapse(&mut self, plan: &CollapsePlan) -> Option<(Site, Tally)> {
+    fn prepare_collapse(&mut self, plan: &CollapsePlan, rules: &CollapseRules) -> Option<(Site, Tally)> {
         let mesh = &self.mesh;
         plan.ring(mesh, &mut self.ring);
         let valence = plan.new_valence(mesh);
@@ -238,7 +238,7 @@ impl<'a> Editor<'a> {
         if valence > allowed || self.ring.is_empty() {
             return None;
         }
-        let mut before = Tally::new();
+        let mut before = Tally::short_of(rules.mend_below.unwrap_or(0.0));
         self.patch.clear();
         for f in plan.removed_faces(mesh).into_iter().flatten() {
             self.patch.old.push(f);
@@ -278,12 +278,9 @@ impl<'a> Editor<'a> {
             return None;
         }
         let floor = rules.min_stretch.min(before.stretch_min);
-        let ceiling = if self.limits.max_size.is_unlimited() {
-            f64::INFINITY
-        } else {
-            self.limits.max_size.at(p).max(before.size_max)
-        };
-        let mut after = Tally::new();
+        let ceiling =
+            if self.limits.max_size.is_unlimited() { f64::INFINITY } else { self.limits.ceiling(p, before.size_max) };
+        let mut after = Tally::short_of(before.threshold);
         for points in &mut self.patch.points {
             points[0] = p;
             let (shape, size) = (stretch(*points), triangle_size(*points));
@@ -292,7 +289,7 @@ impl<'a> Editor<'a> {
             }
             after.add(shape, size);
         }
-        let improves = !rules.must_improve || after.stretch_min > before.stretch_min;
+        let improves = rules.mend_below.is_none() || after.mends(before);
         let even = after.mean() >= rules.mean_stretch.min(before.mean());
         (improves && even && !self.folds()).then_some(after)
     }

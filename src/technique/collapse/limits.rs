@@ -53,6 +53,15 @@ pub struct Limits {
     pub max_valence: usize,
 }
 
+impl Limits {
+    /// The longest side of a new face near `p`, where the faces that it replaces reach `before`: the limit, or what was
+    /// there already where that breaks it. The comparison allows for the single precision in which sizes are kept.
+    pub fn ceiling(&self, p: DVec3, before: f64) -> f64 {
+        let limit = self.max_size.at(p);
+        if before > limit * (1.0 + 1e-6) { before } else { limit }
+    }
+}
+
 /// A face as an edit would make it.
 #[derive(Clone, Copy, Debug)]
 pub struct NewFace {

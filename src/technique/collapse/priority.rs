@@ -30,12 +30,21 @@ pub struct Tally {
     pub size_max: f64,
     /// Sum of inverse sizes.
     pub inverse_size_sum: f64,
+    /// The stretch below which a face falls short.
+    pub threshold: f64,
+    /// Sum of what the faces lack to the threshold.
+    pub shortfall: f64,
 }
 
 impl Tally {
     /// The empty set.
     pub fn new() -> Self {
         Self { stretch_min: f64::INFINITY, ..Self::default() }
+    }
+
+    /// The empty set, which will sum up what its faces lack to a stretch of `threshold`.
+    pub fn short_of(threshold: f64) -> Self {
+        Self { threshold, ..Self::new() }
     }
 
     /// Adds a face.
@@ -47,11 +56,19 @@ impl Tally {
         self.size_sum += size;
         self.size_max = self.size_max.max(size);
         self.inverse_size_sum += if size > 0.0 { 1.0 / size } else { 0.0 };
+        self.shortfall += (self.threshold - stretch).max(0.0);
     }
 
     /// Mean stretch.
     pub fn mean(&self) -> f64 {
         if self.faces == 0 { 0.0 } else { self.stretch_sum / self.faces as f64 }
+    }
+
+    /// Whether these faces, which replace `before`, are a step towards the threshold: the least stretch rises, or the
+    /// shortfall falls, each by more than rounding.
+    pub fn mends(&self, before: &Self) -> bool {
+        self.stretch_min > before.stretch_min * (1.0 + 1e-3)
+            || self.shortfall < before.shortfall - 1e-4 * before.threshold
     }
 
     /// Equation 8: least times mean stretch.

@@ -6,6 +6,7 @@
 //! least two thirds of `angle` whose direction differs by less than 30 degrees. Then chains with a loose end are
 //! dropped if they are shorter than 0.5 % of the bounding box's diagonal, or have fewer than three edges and no seed;
 //! a long crease that a CAD tessellation draws as one edge so stays.
+//! Of curves that run alongside each other within `gap` only the sharpest stays ([`gap`]).
 //! Rims are always curves; so are borders of regions and face groups where asked for. A corner is a vertex where the
 //! number of curve edges is not 2, or where the curve turns by more than `corner_angle`.
 //!
@@ -20,6 +21,7 @@
 
 mod chains;
 mod corners;
+mod gap;
 mod sharpness;
 #[cfg(test)]
 mod tests;
@@ -45,6 +47,8 @@ pub struct FeatureRules {
     pub region_borders: bool,
     /// The geodesic radius of normal voting; without it the plain angles between faces count.
     pub voting_radius: Option<f64>,
+    /// Of curves that run alongside each other within this distance only the sharpest is marked; mesh units.
+    pub gap: f64,
 }
 
 /// What was found.
@@ -56,6 +60,8 @@ pub struct Report {
     pub grown_edges: usize,
     /// Chains that were too short.
     pub dropped_chains: usize,
+    /// Sharp edges that ran alongside a sharper curve.
+    pub alongside_edges: usize,
     /// Rim edges.
     pub rim_edges: usize,
     /// Edges on borders of regions or face groups that are neither sharp nor rims.
@@ -97,6 +103,7 @@ pub fn mark_features(surface: &Surface, rules: &FeatureRules, watch: &Watch) -> 
         if rules.region_borders {
             curves.mark_borders(&mut report);
         }
+        report.alongside_edges = curves.drop_alongside(rules.gap, rules.corner_angle);
         report.dropped_chains = curves.drop_short_chains(rules);
         let corners = match rules.voting_radius {
             None => curves.corners(rules.corner_angle),

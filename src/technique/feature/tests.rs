@@ -1,11 +1,19 @@
 //! Known answers: cube, cylinders, sphere, flat grid.
 
+use glam::DVec3;
+
 use super::*;
 use crate::mesh::halfedge::tests::surface;
 use crate::mesh::{MarkCause, Regions};
 
-const RULES: FeatureRules =
-    FeatureRules { angle: 30.0, seed_angle: 40.0, corner_angle: 45.0, region_borders: true, voting_radius: None };
+const RULES: FeatureRules = FeatureRules {
+    angle: 30.0,
+    seed_angle: 40.0,
+    corner_angle: 45.0,
+    region_borders: true,
+    voting_radius: None,
+    gap: 0.0,
+};
 
 fn find(surface: &Surface, rules: &FeatureRules) -> (Surface, Report) {
     mark_features(surface, rules, &Watch::silent()).expect("nobody interrupts")
@@ -83,4 +91,28 @@ fn a_short_loose_chain_is_dropped() {
     let mesh = surface(&points, &[[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]]);
     let (_, report) = find(&mesh, &RULES);
     assert_eq!((report.sharp_edges, report.rim_edges), (0, 4));
+}
+
+#[test]
+fn of_two_curves_that_run_alongside_only_the_sharper_stays() {
+    // A trough of three strips over a long floor: two creases 0.01 apart, the left one sharper.
+    let profile = [(-1.0, 1.5), (0.0, 0.0), (0.01, 0.002), (1.0, 2.0)];
+    let columns = 6_u32;
+    let point = |i: u32, k: usize| DVec3::new(profile[k].0, f64::from(i), profile[k].1);
+    let points = (0..=columns).flat_map(|i| (0..4).map(move |k| point(i, k))).collect();
+    let mut faces = Vec::new();
+    for i in 0..columns {
+        for k in 0..3 {
+            let [a, b, c, d] = [4 * i + k, 4 * i + k + 1, 4 * (i + 1) + k + 1, 4 * (i + 1) + k].map(VertexId::from_raw);
+            faces.extend([[a, b, c], [a, c, d]]);
+        }
+    }
+    let trough = Surface { points, faces: faces.into(), carried: crate::mesh::Carried::default() };
+    let (_, all) = find(&trough, &RULES);
+    let (marked, thinned) = find(&trough, &FeatureRules { gap: 0.05, ..RULES });
+    assert_eq!(all.sharp_edges, 2 * columns as usize);
+    assert_eq!((thinned.sharp_edges, thinned.alongside_edges), (columns as usize, columns as usize));
+    let left = |[a, b]: &[VertexId; 2]| marked.points[*a].x == 0.0 && marked.points[*b].x == 0.0;
+    let features = marked.carried.marks.iter().filter(|(_, mark)| mark.cause == MarkCause::Feature);
+    assert!(features.map(|(edge, _)| edge).all(left));
 }

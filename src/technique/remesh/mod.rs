@@ -4,139 +4,20 @@
 //! tangential relaxation, projection), each edit admitted by the [`Editor`] only: thresholds, certified tolerance and
 //! embedding hold after every one of them, and it must gain, so that the passes end.
 //!
-//! [`raise_stretch`] is the phase that Date et al. (JCISE 2005, section 5.2.1) ask for before property control, "only
-//! edges which do not satisfy" the threshold being changed, made precise: for each face below the threshold a collapse,
-//! a flip, a relocation or a split of its long edge that raises the least stretch of its star.
+//! [`raise_stretch`] repairs the faces below a threshold before and after.
 
 mod ops;
+mod raise;
 
 pub use ops::Gain;
+pub use raise::{faces_below, raise_stretch};
 
 use glam::DVec3;
 
 use crate::mesh::geometry::area_vector;
-use crate::mesh::halfedge::edge_of;
-use crate::mesh::{EdgeId, FaceId, Freedom, VertexId};
+use crate::mesh::{EdgeId, Freedom, VertexId};
 use crate::technique::collapse::{CollapseRules, Editor, Ending, simplify};
 use crate::watch::{Cancelled, Watch};
-
-/// Rounds after which a phase ends even if it still finds something: each round gains, but ever less.
-const MOST_ROUNDS: usize = 24;
-
-/// Raises the stretch of the faces below `threshold`, worst first. Returns how many are left.
-pub fn raise_stretch(
-    editor: &mut Editor<'_>,
-    threshold: f64,
-    rules: &CollapseRules,
-    watch: &Watch,
-) -> Result<usize, Cancelled> {
-    let rules = CollapseRules { must_improve: true, min_stretch: threshold, mean_stretch: 0.0, ..*rules };
-    let mut left = usize::MAX;
-    for _ in 0..MOST_ROUNDS {
-        let bad = faces_below(editor, threshold);
-        if left == usize::MAX {
-            watch.phase("raise stretch", Some(bad.len() as u64));
-        }
-        left = bad.len();
-        watch.advance(0, || format!("{left} faces below {threshold}"));
-        let mut gained = false;
-        for (place, &f) in bad.iter().enumerate() {
-            if place.is_multiple_of(64) {
-                watch.check()?;
-            }
-            if editor.mesh().face_is_live(f) && editor.stretch(f) < threshold {
-                gained |= mend(editor, f, &rules);
-            }
-        }
-        if !gained {
-            break;
-        }
-    }
-    Ok(faces_below(editor, threshold).len())
-}
-
-/// The live faces with less stretch, worst first.
-pub fn faces_below(editor: &Editor<'_>, threshold: f64) -> Vec<FaceId> {
-    let mut bad: Vec<FaceId> = editor.mesh().faces().filter(|&f| editor.stretch(f) < threshold).collect();
-    bad.sort_by(|&f, &g| editor.stretch(f).total_cmp(&editor.stretch(g)).then(f.cmp(&g)));
-    bad
-}
-
-/// One edit that raises the least stretch round a face: collapse, flip, relocation, split of its longest edge.
-fn mend(editor: &mut Editor<'_>, f: FaceId, rules: &CollapseRules) -> bool {
-    let edges = edges_by_length(editor, f);
-    if edges.iter().any(|&e| editor.try_collapse(e, rules).is_some()) {
-        return true;
-    }
-    if edges.iter().rev().any(|&e| editor.try_flip(e, Gain::LeastStretch)) {
-        return true;
-    }
-    let corners = editor.mesh().corners(f);
-    if corners.iter().any(|&v| relax(editor, v, Gain::LeastStretch)) {
-        return true;
-    }
-    // The star's other edges may stand in the way of all that.
-    for v in corners {
-        let star: Vec<EdgeId> = editor.mesh().outgoing(v).map(edge_of).collect();
-        for e in star {
-            if editor.mesh().edge_is_live(e) && !edges.contains(&e) && editor.try_collapse(e, rules).is_some() {
-                return true;
-            }
-        }
-        if !editor.mesh().face_is_live(f) || !editor.mesh().vertex_is_live(v) {
-            return true;
-        }
-    }
-    split_cap(editor, f, edges[2], rules)
-}
-
-/// Splits the long edge of a cap at the foot of its height, and collapses the height.
-fn split_cap(editor: &mut Editor<'_>, f: FaceId, longest: EdgeId, rules: &CollapseRules) -> bool {
-    let mesh = editor.mesh();
-    let [a, b] = mesh.ends(longest);
-    let Some(apex) = mesh.corners(f).into_iter().find(|&v| v != a && v != b) else { return false };
-    let (p, q, r) = (mesh.point(a), mesh.point(b), mesh.point(apex));
-    let along = q - p;
-    let t = (r - p).dot(along) / along.length_squared().max(f64::MIN_POSITIVE);
-    if !(0.1..=0.9).contains(&t) {
-        return false;
-    }
-    let height = (r - (p + t * along)).length();
-    // Only caps: elsewhere a split makes things worse, and nothing would undo it.
-    if height > 0.2 * along.length() {
-        return false;
-    }
-    let before = editor.stretch(f);
-    let Some(foot) = editor.try_split(longest, p + t * along) else { return false };
-    let Some(h) = editor.mesh().find_halfedge(foot, apex) else { return false };
-    // The star of the height contains the halves of the cap, which are as bad as it was.
-    let rules = CollapseRules { min_stretch: before, ..*rules };
-    if editor.try_collapse(edge_of(h), &rules).is_some() {
-        return true;
-    }
-    // Undo: the foot goes back into an end of the edge.
-    let back: Vec<EdgeId> = editor.mesh().outgoing(foot).map(edge_of).collect();
-    let rules = CollapseRules { min_stretch: 0.0, must_improve: false, ..rules };
-    for e in back {
-        if editor.mesh().ends(e).iter().any(|&v| v == a || v == b) && editor.try_collapse(e, &rules).is_some() {
-            break;
-        }
-    }
-    false
-}
-
-/// The edges of a face, shortest first.
-fn edges_by_length(editor: &Editor<'_>, f: FaceId) -> [EdgeId; 3] {
-    let mesh = editor.mesh();
-    let first = mesh.face_halfedge(f);
-    let mut edges = [first, mesh.next(first), mesh.prev(first)].map(edge_of);
-    let length = |e: EdgeId| {
-        let [a, b] = mesh.ends(e);
-        (mesh.point(b) - mesh.point(a)).length_squared()
-    };
-    edges.sort_by(|&d, &e| length(d).total_cmp(&length(e)).then(d.cmp(&e)));
-    edges
-}
 
 /// Least and mean stretch that optimised coarsening asks of new stars, in falling steps.
 const COMFORT: [(f64, f64); 3] = [(0.7, 0.88), (0.6, 0.83), (0.5, 0.78)];

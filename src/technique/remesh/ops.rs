@@ -13,8 +13,10 @@ use crate::technique::collapse::{Editor, Keeper};
 const FLAT_COSINE: f64 = 0.996;
 
 /// When an edit is worth it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Gain {
+    /// The faces come nearer to this stretch: see [`Tally::mends`].
+    Mend(f64),
     /// The least stretch rises.
     LeastStretch,
     /// The product of least and mean stretch rises, and the least does not fall below the threshold.
@@ -32,7 +34,7 @@ impl Editor<'_> {
         if !self.flip_keeps_valence(plan.ends, plan.apexes, gain) {
             return false;
         }
-        let before = self.tally(&[left, right]);
+        let before = self.tally(&[left, right], gain);
         self.patch.clear();
         self.patch.old.extend([left, right]);
         self.patch.ids.extend([left, right]);
@@ -64,7 +66,11 @@ impl Editor<'_> {
         }
         let most = self.limits.max_valence as i64;
         let tallest = ends.map(valence).into_iter().max().unwrap_or(0);
-        gain == Gain::LeastStretch && apexes.iter().all(|&v| valence(v) < most.max(tallest))
+        let is_worth_it = match gain {
+            Gain::Mend(_) | Gain::LeastStretch => true,
+            Gain::Quality | Gain::None => false,
+        };
+        is_worth_it && apexes.iter().all(|&v| valence(v) < most.max(tallest))
             || apexes.iter().all(|&v| valence(v) < most)
     }
 
@@ -154,7 +160,7 @@ impl Editor<'_> {
             self.patch.corners.push(corners);
             self.patch.points.push(corners.map(|w| if w == v { to } else { self.mesh.point(w) }));
         }
-        let before = self.tally(&self.patch.old);
+        let before = self.tally(&self.patch.old, gain);
         if !self.gains(&before, gain) || self.folds() || !self.patch_admitted() {
             return false;
         }
@@ -185,8 +191,11 @@ impl Editor<'_> {
     }
 
     /// The tally of live faces.
-    pub fn tally(&self, faces: &[FaceId]) -> Tally {
-        let mut tally = Tally::new();
+    fn tally(&self, faces: &[FaceId], gain: Gain) -> Tally {
+        let mut tally = match gain {
+            Gain::Mend(threshold) => Tally::short_of(threshold),
+            Gain::LeastStretch | Gain::Quality | Gain::None => Tally::new(),
+        };
         for &f in faces {
             tally.add(self.stretch(f), self.size(f));
         }
@@ -195,17 +204,18 @@ impl Editor<'_> {
 
     /// Whether the patch is worth it, and breaks no threshold that held.
     fn gains(&self, before: &Tally, gain: Gain) -> bool {
-        let mut after = Tally::new();
+        let mut after = Tally::short_of(before.threshold);
         let limit = &self.limits.max_size;
         for points in &self.patch.points {
             let size = triangle_size(*points);
-            if !limit.is_unlimited() && size > limit.at(points[0]).max(before.size_max * (1.0 + 1e-6)) {
+            if !limit.is_unlimited() && size > self.limits.ceiling(points[0], before.size_max) {
                 return false;
             }
             after.add(stretch(*points), size);
         }
         let floor = self.limits.min_stretch.min(before.stretch_min);
         match gain {
+            Gain::Mend(_) => after.stretch_min >= before.stretch_min.min(before.threshold) && after.mends(before),
             Gain::LeastStretch => after.stretch_min > before.stretch_min * (1.0 + 1e-3),
             Gain::Quality => after.stretch_min >= floor && after.quality() > before.quality() * (1.0 + 2e-3),
             Gain::None => after.stretch_min >= floor,

@@ -58,6 +58,7 @@ fn cube(sigma: f64, place: impl Fn(DVec3) -> DVec3) -> Surface {
 
 fn sharp(mesh: &Surface) -> Vec<[DVec3; 2]> {
     let rules = FeatureRules {
+        gap: 0.0,
         angle: 30.0,
         seed_angle: 40.0,
         corner_angle: 45.0,
