@@ -85,6 +85,11 @@ impl ResolvedFreedom {
         self.edge(key) != Freedom::Keep || self.seam_edges.contains(&key)
     }
 
+    /// Lets collapses run along an edge that is no curve: for merging corners that it joins.
+    pub fn make_curve(&mut self, key: EdgeKey) {
+        self.edges.entry(key).or_insert(Freedom::OnCurve);
+    }
+
     /// The freedom of an edge.
     #[inline]
     pub fn edge(&self, key: EdgeKey) -> Freedom {

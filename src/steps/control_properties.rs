@@ -356,6 +356,7 @@ fn setup(
         feature_tolerance,
         feature_weight: params.feature_weight,
         limits,
+        may_merge_corners: input.locks.keep.is_empty() && input.locks.only.is_empty(),
     })
 }
 

@@ -349,6 +349,7 @@ fn setup(
         feature_weight: params.feature_weight,
         // Quality improvement has no valence limit of its own; this one keeps fans of hundreds of faces away.
         limits: Limits { min_stretch: FLOOR, max_size, max_valence: 12 },
+        may_merge_corners: input.locks.keep.is_empty() && input.locks.only.is_empty(),
     })
 }
 

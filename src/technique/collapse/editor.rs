@@ -229,6 +229,19 @@ impl<'a> Editor<'a> {
         None
     }
 
+    /// Collapses the edge into a vertex at `p`, where all tests admit that.
+    pub fn try_collapse_at(&mut self, edge: EdgeId, p: DVec3, rules: &CollapseRules) -> Option<VertexId> {
+        let plan = check_collapse(&self.mesh, edge).ok()?;
+        let (site, before) = self.prepare_collapse(&plan, rules)?;
+        let p = plan.placement.nearest(p);
+        self.assess(&plan, &site, &before, p, rules)?;
+        if !(self.curve_admits(&plan, p) && self.patch_admitted()) {
+            return None;
+        }
+        self.apply_collapse(&plan, p);
+        Some(plan.kept)
+    }
+
     /// Fills the patch with the star of the edge; the merged vertex's corner comes first in each new face.
     fn prepare_collapse(&mut self, plan: &CollapsePlan, rules: &CollapseRules) -> Option<(Site, Tally)> {
         let mesh = &self.mesh;

@@ -83,7 +83,65 @@ fn mend(editor: &mut Editor<'_>, f: FaceId, rules: &CollapseRules) -> bool {
             return true;
         }
     }
-    split_cap(editor, f, edges[2], rules)
+    widen_wedge(editor, f, rules) || split_cap(editor, f, edges[2], rules)
+}
+
+/// Collapses two curve edges at once, one on each side of a narrow wedge between two curves: either alone makes things
+/// worse, but both together leave one face of the wedge's angle where there were several.
+fn widen_wedge(editor: &mut Editor<'_>, f: FaceId, rules: &CollapseRules) -> bool {
+    let threshold = rules.mend_below.unwrap_or(rules.min_stretch);
+    let curved: Vec<(VertexId, [VertexId; 2])> = editor
+        .mesh()
+        .corners(f)
+        .into_iter()
+        .filter(|&v| editor.mesh().vertex_freedom(v) == Freedom::OnCurve)
+        .filter_map(|v| Some((v, editor.curve_neighbours(v)?)))
+        .collect();
+    let mut best: Option<(f64, [(VertexId, VertexId); 2])> = None;
+    for (place, &(p, to_p)) in curved.iter().enumerate() {
+        for &(q, to_q) in &curved[place + 1..] {
+            for pair in to_p.into_iter().flat_map(|a| to_q.map(|b| [(p, a), (q, b)])) {
+                let rest = shortfall_after(editor, pair, threshold);
+                if rest.is_some_and(|rest| best.is_none_or(|(least, _)| rest < least)) {
+                    best = rest.map(|rest| (rest, pair));
+                }
+            }
+        }
+    }
+    let Some((_, [first, second])) = best else { return false };
+    // The first of the two alone may fall short by as much as the face does; the second must mend.
+    let loose = CollapseRules { min_stretch: 0.25 * editor.stretch(f), mend_below: None, ..*rules };
+    merge_into(editor, first, &loose) && {
+        merge_into(editor, second, rules);
+        true
+    }
+}
+
+/// Collapses the edge from a vertex to its neighbour on the curve, to where that is.
+fn merge_into(editor: &mut Editor<'_>, (from, to): (VertexId, VertexId), rules: &CollapseRules) -> bool {
+    // The first of two collapses may have taken an end of the second.
+    let are_live = [from, to].iter().all(|&v| editor.mesh().vertex_is_live(v));
+    let Some(h) = are_live.then(|| editor.mesh().find_halfedge(from, to)).flatten() else { return false };
+    let at = editor.mesh().point(to);
+    editor.try_collapse_at(edge_of(h), at, rules).is_some()
+}
+
+/// What the stars of two vertices would lack to the threshold, were each merged into its partner; `None` where that is
+/// no gain.
+fn shortfall_after(editor: &Editor<'_>, pair: [(VertexId, VertexId); 2], threshold: f64) -> Option<f64> {
+    let mesh = editor.mesh();
+    let mut faces: Vec<FaceId> = pair.iter().flat_map(|&(v, _)| mesh.faces_around(v)).collect();
+    faces.sort_unstable();
+    faces.dedup();
+    let (mut before, mut after) = (0.0, 0.0);
+    for f in faces {
+        before += (threshold - editor.stretch(f)).max(0.0);
+        let moved = mesh.corners(f).map(|v| pair.iter().find(|(from, _)| *from == v).map_or(v, |&(_, to)| to));
+        if moved[0] != moved[1] && moved[1] != moved[2] && moved[2] != moved[0] {
+            after += (threshold - stretch(moved.map(|v| mesh.point(v)))).max(0.0);
+        }
+    }
+    (after < before - 0.05 * threshold).then_some(after)
 }
 
 /// Steps of a nudge, as shares of the shortest edge at the vertex for a free one, of the way to the neighbour on a curve.
