@@ -52,7 +52,7 @@ pub struct FeaturesParams {
     pub region_borders: bool,
     /// A curve that turns by more than this angle has a corner, which later steps keep exactly. Degrees, default 45.
     pub corner_angle: Angle,
-    /// How sharp edges are found: `"dihedral"` (default), or `"normal-voting"` for scans.
+    /// How sharp edges are found: `"dihedral"` (default), `"normal-voting"` for scans, or `"auto"`.
     pub method: FeatureMethod,
     /// How far votes reach along the surface with `normal-voting`. Length; default 5 mean edges. Sharp edges closer to
     /// each other than this melt into one.
@@ -90,12 +90,17 @@ pub enum FeatureMethod {
     Dihedral,
     /// By the votes of the normals in a neighbourhood: for scans and other noisy, evenly meshed surfaces.
     NormalVoting,
+    /// Dihedral, unless a fifth of the sharp edges or more run alongside each other within `min-gap`: then they are the
+    /// noise of a scan, and normal voting is used.
+    Auto,
 }
 
 /// What was marked.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub struct FeaturesStats {
+    /// How sharp edges were found; never `auto`.
+    pub method: FeatureMethod,
     /// Sharp edges.
     pub sharp_edges: usize,
     /// Of those, edges below `angle` that continue a chain.
@@ -158,25 +163,38 @@ pub fn features(
         seed_angle: params.seed_angle.map_or((angle + 10.0).min(180.0), |seed| seed.0),
         corner_angle: params.corner_angle.0,
         region_borders: params.region_borders,
-        voting_radius: voting_radius(surface, params)?,
+        voting_radius: (params.method == FeatureMethod::NormalVoting)
+            .then(|| voting_radius(surface, params))
+            .transpose()?,
         gap: params.min_gap.resolve(Aabb::of(surface.points.iter().copied()).diagonal()),
     };
     watch.phase("marking features", None);
-    let (mut marked, report) = mark_features(surface, &rules, watch)?;
+    let (mut marked, mut report) = mark_features(surface, &rules, watch)?;
+    let mut method = params.method;
+    if method == FeatureMethod::Auto {
+        method = FeatureMethod::Dihedral;
+        if is_noise(&report) {
+            method = FeatureMethod::NormalVoting;
+            let rules = FeatureRules { voting_radius: Some(voting_radius(surface, params)?), ..rules };
+            (marked, report) = mark_features(surface, &rules, watch)?;
+        }
+    }
     if params.curvature {
         watch.phase("curvature", None);
         store_curvature(&mut marked, watch)?;
     }
-    Ok((marked, stats(&report, angle)))
+    Ok((marked, FeaturesStats { method, ..stats(&report, angle) }))
 }
 
-fn voting_radius(surface: &Surface, params: &FeaturesParams) -> Result<Option<f64>, FeaturesError> {
-    if params.method == FeatureMethod::Dihedral {
-        return Ok(None);
-    }
+/// Sharp edges that run alongside each other are rare on parts, and the rule in noise; so few say nothing.
+fn is_noise(report: &Report) -> bool {
+    report.alongside_edges >= 50 && 4 * report.alongside_edges >= report.sharp_edges
+}
+
+fn voting_radius(surface: &Surface, params: &FeaturesParams) -> Result<f64, FeaturesError> {
     let diagonal = Aabb::of(surface.points.iter().copied()).diagonal();
     let radius = params.radius.map_or_else(|| VOTING_EDGES * mean_edge(surface), |length| length.resolve(diagonal));
-    if radius > 0.0 { Ok(Some(radius)) } else { Err(FeaturesError::BadRadius(radius)) }
+    if radius > 0.0 { Ok(radius) } else { Err(FeaturesError::BadRadius(radius)) }
 }
 
 /// Adds the principal curvatures as vertex fields.
@@ -191,6 +209,7 @@ fn store_curvature(surface: &mut Surface, watch: &Watch) -> Result<(), Cancelled
 
 fn stats(report: &Report, angle: f64) -> FeaturesStats {
     FeaturesStats {
+        method: FeatureMethod::Dihedral,
         sharp_edges: report.sharp_edges,
         grown_edges: report.grown_edges,
         dropped_chains: report.dropped_chains,
