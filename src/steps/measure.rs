@@ -74,7 +74,7 @@ pub struct Step;
 
 impl StepContract for Step {
     const NAME: &'static str = "measure";
-    const REVISION: u32 = 1;
+    const REVISION: u32 = 2;
     const INPUTS: &'static [InputDef] = &[
         InputDef { name: "from", accepts: &[Port::Soup, Port::Surface], required: true, doc: "the mesh to measure" },
         InputDef {

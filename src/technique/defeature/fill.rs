@@ -107,12 +107,13 @@ impl Fill {
             feature_tolerance: SLACK * size,
             feature_weight: 100.0,
             limits: Limits { min_stretch: 0.2, max_size: SizeField::Uniform(LONGEST * size), max_valence: 12 },
+            may_merge_corners: false,
         };
         let Ok(mut editor) = open(&fine, &freedom, &membrane, &tree, setup) else { return Ok(None) };
         let rules = CollapseRules {
             min_stretch: 0.2,
             mean_stretch: 0.0,
-            must_improve: false,
+            mend_below: None,
             order: Order::OnSurface,
             priority: Priority::QualityGain,
         };

@@ -11,8 +11,14 @@ use crate::mesh::topology::{EdgeTable, euler_characteristic};
 use crate::mesh::validate::validate_surface;
 use crate::technique::feature::{FeatureRules, mark_features};
 
-const RULES: FeatureRules =
-    FeatureRules { angle: 30.0, seed_angle: 40.0, corner_angle: 45.0, region_borders: true, voting_radius: None };
+const RULES: FeatureRules = FeatureRules {
+    angle: 30.0,
+    seed_angle: 40.0,
+    corner_angle: 45.0,
+    region_borders: true,
+    voting_radius: None,
+    gap: 0.0,
+};
 
 /// Facets round a hole.
 const N: usize = 32;
