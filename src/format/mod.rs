@@ -2,7 +2,7 @@
 //!
 //! Every reader takes any bytes: damage gives a [`FormatError`] with its place and never a panic, and no count in a
 //! file makes a reader allocate more than the file could hold. A format is one entry here and one file: a variant of
-//! [`Format`], an arm in [`Format::def`], a [`FormatDef`] beside its reader and writer.
+//! [`Format`], an arm in `Format::def`, a `FormatDef` beside its reader and writer.
 
 mod bdf;
 mod binary;

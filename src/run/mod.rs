@@ -6,7 +6,7 @@
 //! last one.
 //!
 //! # Invariants
-//! - Every change of state goes through [`board::Board::set`].
+//! - Every change of state goes through `board::Board::set`.
 //! - A result is the same for any number of threads: a step sees nothing of the schedule, and what it does in
 //!   parallel it reduces in index order.
 //! - Files appear whole or not at all. A run that dies leaves finished results in the store and, at most, hidden

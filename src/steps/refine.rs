@@ -2,7 +2,7 @@
 //!
 //! # Algorithm
 //! Midpoints of all edges that are too long, and the faces between them cut to match, in rounds; the work is done by
-//! [`refine`](crate::technique::refine).
+//! `technique::refine`.
 //!
 //! Based on: H. Date, S. Kanai, T. Kishinami, I. Nishigaki, T. Dohi. High-Quality and Property Controlled Finite Element
 //! Mesh Generation From Triangular Meshes using the Multiresolution Technique. JCISE 5(4), 2005, section 4.1.

@@ -3,7 +3,7 @@
 //! # Algorithm
 //! The marks of `features` say where faces end; rings of faces between circles are the sides of holes and bosses. Their
 //! faces go, their rims are filled without new vertices, and each fill is refined and improved alone; see
-//! [`defeature`](crate::technique::defeature). Fillets at rims and floors need marks at both ends to be seen as part of
+//! `technique::defeature`. Fillets at rims and floors need marks at both ends to be seen as part of
 //! a hole: a side that runs on smoothly into other faces is not found.
 //!
 //! Based on: H. Date, S. Kanai, T. Kishinami, I. Nishigaki, T. Dohi. High-Quality and Property Controlled Finite Element

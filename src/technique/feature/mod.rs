@@ -6,7 +6,7 @@
 //! least two thirds of `angle` whose direction differs by less than 30 degrees. Then chains with a loose end are
 //! dropped if they are shorter than 0.5 % of the bounding box's diagonal, or have fewer than three edges and no seed;
 //! a long crease that a CAD tessellation draws as one edge so stays.
-//! Of curves that run alongside each other within `gap` only the sharpest stays ([`gap`]).
+//! Of curves that run alongside each other within `gap` only the sharpest stays (see `gap`).
 //! Rims are always curves; so are borders of regions and face groups where asked for. A corner is a vertex where the
 //! number of curve edges is not 2, or where the curve turns by more than `corner_angle`.
 //!
