@@ -9,7 +9,7 @@ use rustc_hash::FxHashMap;
 
 use super::collision::Collision;
 use super::keeper::Keeper;
-use super::limits::Limits;
+use super::limits::{Limits, least_stretch};
 use super::placement::{Order, Site};
 use super::priority::{Priority, Tally};
 use crate::mesh::edit::collapse::Ring;
@@ -290,7 +290,7 @@ impl<'a> Editor<'a> {
         if !p.is_finite() || !self.keeper.admits_point(&site.planes, &site.lines, p - site.origin) {
             return None;
         }
-        let floor = rules.min_stretch.min(before.stretch_min);
+        let floor = least_stretch(rules.min_stretch, before.stretch_min);
         let ceiling =
             if self.limits.max_size.is_unlimited() { f64::INFINITY } else { self.limits.ceiling(p, before.size_max) };
         let mut after = Tally::short_of(before.threshold);

@@ -6,6 +6,7 @@ use crate::mesh::edit::{check_flip, check_split, flip, relocate, slide, split};
 use crate::mesh::geometry::{area_vector, stretch, triangle_size};
 use crate::mesh::halfedge::{edge_of, halfedge_of, twin};
 use crate::mesh::{EdgeId, FaceId, Freedom, HalfedgeId, VertexId};
+use crate::technique::collapse::limits::least_stretch;
 use crate::technique::collapse::priority::Tally;
 use crate::technique::collapse::{Editor, Keeper};
 
@@ -213,9 +214,11 @@ impl Editor<'_> {
             }
             after.add(stretch(*points), size);
         }
-        let floor = self.limits.min_stretch.min(before.stretch_min);
+        let floor = least_stretch(self.limits.min_stretch, before.stretch_min);
         match gain {
-            Gain::Mend(_) => after.stretch_min >= before.stretch_min.min(before.threshold) && after.mends(before),
+            Gain::Mend(_) => {
+                after.stretch_min >= least_stretch(before.threshold, before.stretch_min) && after.mends(before)
+            }
             Gain::LeastStretch => after.stretch_min > before.stretch_min * (1.0 + 1e-3),
             Gain::Quality => after.stretch_min >= floor && after.quality() > before.quality() * (1.0 + 2e-3),
             Gain::None => after.stretch_min >= floor,

@@ -90,6 +90,10 @@ fn mend(editor: &mut Editor<'_>, f: FaceId, rules: &CollapseRules) -> bool {
 /// worse, but both together leave one face of the wedge's angle where there were several.
 fn widen_wedge(editor: &mut Editor<'_>, f: FaceId, rules: &CollapseRules) -> bool {
     let threshold = rules.mend_below.unwrap_or(rules.min_stretch);
+    // The first of the two may make things worse: never where the limit holds.
+    if editor.stretch(f) >= editor.limits().min_stretch {
+        return false;
+    }
     let curved: Vec<(VertexId, [VertexId; 2])> = editor
         .mesh()
         .corners(f)
