@@ -10,6 +10,7 @@ pub mod halfedge;
 pub mod hierarchy;
 pub mod id;
 pub mod predicate;
+pub mod quads;
 pub mod soup;
 pub mod surface;
 pub mod topology;
@@ -21,5 +22,6 @@ pub use freedom::{FreedomError, LockRules, ResolvedFreedom, Rim, resolve_freedom
 pub use halfedge::HalfedgeMesh;
 pub use hierarchy::Hierarchy;
 pub use id::{EdgeId, FaceId, HalfedgeId, Id, IdVec, VertexId};
+pub use quads::{Cover, Quads};
 pub use soup::{Facet, Soup};
 pub use surface::Surface;

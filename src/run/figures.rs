@@ -18,6 +18,10 @@ pub(super) fn figures(artifact: &Artifact) -> Figures {
             let finest = &hierarchy.finest;
             Figures { port, ..of_mesh(finest.points.len(), finest.faces.len(), &surface_stretches(finest)) }
         }
+        Artifact::Quads(quads) => {
+            let mesh = &quads.mesh;
+            Figures { port, ..of_mesh(mesh.points.len(), mesh.faces.len(), &stretches(mesh)) }
+        }
         Artifact::Metrics(metrics) => Figures { port, metrics: Some((**metrics).clone()), ..Figures::default() },
     }
 }

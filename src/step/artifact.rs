@@ -6,7 +6,7 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 
 use super::failure::StepFailure;
-use crate::mesh::{Hierarchy, Soup, Surface};
+use crate::mesh::{Hierarchy, Quads, Soup, Surface};
 use crate::metric::Measurement;
 
 /// The type of an input or output, checked before anything runs.
@@ -21,6 +21,8 @@ pub enum Port {
     Surface,
     /// A surface with the record of the collapses that coarsen it.
     Hierarchy,
+    /// A quad-dominant mesh.
+    Quads,
     /// A table of metrics.
     Metrics,
 }
@@ -32,6 +34,7 @@ impl fmt::Display for Port {
             Self::Soup => "soup",
             Self::Surface => "surface",
             Self::Hierarchy => "hierarchy",
+            Self::Quads => "quads",
             Self::Metrics => "metrics",
         })
     }
@@ -57,6 +60,8 @@ pub enum Artifact {
     Surface(Arc<Surface>),
     /// See [`Port::Hierarchy`].
     Hierarchy(Arc<Hierarchy>),
+    /// See [`Port::Quads`].
+    Quads(Arc<Quads>),
     /// See [`Port::Metrics`].
     Metrics(Arc<Measurement>),
 }
@@ -69,6 +74,7 @@ impl Artifact {
             Self::Soup(_) => Port::Soup,
             Self::Surface(_) => Port::Surface,
             Self::Hierarchy(_) => Port::Hierarchy,
+            Self::Quads(_) => Port::Quads,
             Self::Metrics(_) => Port::Metrics,
         }
     }
@@ -89,6 +95,14 @@ impl Artifact {
         }
     }
 
+    /// The quads, or a failure that names the port found.
+    pub fn as_quads(&self) -> Result<&Arc<Quads>, StepFailure> {
+        match self {
+            Self::Quads(quads) => Ok(quads),
+            other => Err(StepFailure::bad_input(format!("expected quads, got a {}", other.port()))),
+        }
+    }
+
     /// The soup, or a failure that names the port found.
     pub fn as_soup(&self) -> Result<&Arc<Soup>, StepFailure> {
         match self {
@@ -102,6 +116,7 @@ impl Artifact {
         match self {
             Self::Soup(soup) => Some(Arc::clone(soup)),
             Self::Surface(surface) => Some(Arc::new(surface.to_soup())),
+            Self::Quads(quads) => Some(Arc::new(quads.mesh.clone())),
             Self::File(_) | Self::Hierarchy(_) | Self::Metrics(_) => None,
         }
     }

@@ -76,10 +76,15 @@ impl StepContract for Step {
     const NAME: &'static str = "measure";
     const REVISION: u32 = 2;
     const INPUTS: &'static [InputDef] = &[
-        InputDef { name: "from", accepts: &[Port::Soup, Port::Surface], required: true, doc: "the mesh to measure" },
+        InputDef {
+            name: "from",
+            accepts: &[Port::Soup, Port::Surface, Port::Quads],
+            required: true,
+            doc: "the mesh to measure",
+        },
         InputDef {
             name: "reference",
-            accepts: &[Port::Soup, Port::Surface],
+            accepts: &[Port::Soup, Port::Surface, Port::Quads],
             required: false,
             doc: "the mesh to compare with",
         },

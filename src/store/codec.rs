@@ -12,12 +12,13 @@ use glam::DVec3;
 
 use super::columns::{ColumnReader, ColumnWriter, HEAD};
 use crate::mesh::{
-    Carried, EdgeKey, EdgeMark, Facet, Field, Freedom, Groups, Id, IdVec, MarkCause, Regions, SeamId, Soup, Support,
-    Surface, VertexId,
+    Carried, EdgeKey, EdgeMark, Facet, Field, Freedom, Groups, Id, IdVec, MarkCause, Quads, Regions, SeamId, Soup,
+    Support, Surface, VertexId,
 };
 use crate::metric::Measurement;
 use crate::step::{Artifact, FileBytes, Port};
 
+mod cover;
 mod forest;
 
 /// Raised whenever the canonical bytes of equal artifacts change; part of every key.
@@ -69,6 +70,12 @@ pub fn encode(artifact: &Artifact) -> Vec<u8> {
             forest::encode(&mut writer, hierarchy);
             writer.finish()
         }
+        Artifact::Quads(quads) => {
+            let mut writer = start(Port::Quads, quads.mesh.points.len() * 24 + quads.mesh.faces.len() * 17);
+            encode_soup(&mut writer, &quads.mesh);
+            cover::encode(&mut writer, quads.cover.as_ref());
+            writer.finish()
+        }
         Artifact::Metrics(metrics) => {
             let mut writer = start(Port::Metrics, 4096);
             writer.bytes(&serde_json::to_vec(&**metrics).unwrap_or_default());
@@ -97,6 +104,11 @@ pub fn decode(bytes: &[u8]) -> Result<Artifact, CodecError> {
             let finest = decode_surface(&mut reader)?;
             Artifact::Hierarchy(Arc::new(forest::decode(&mut reader, finest)?))
         }
+        5 => {
+            let mesh = decode_soup(&mut reader)?;
+            let cover = cover::decode(&mut reader, mesh.faces.len())?;
+            Artifact::Quads(Arc::new(Quads { mesh, cover }))
+        }
         _ => return Err(CodecError::Malformed("unknown kind of artifact")),
     };
     reader.end()?;
@@ -112,6 +124,7 @@ fn start(port: Port, capacity: usize) -> ColumnWriter {
         Port::Surface => 2,
         Port::Metrics => 3,
         Port::Hierarchy => 4,
+        Port::Quads => 5,
     };
     ColumnWriter::new([a, b, c, d, low, high, tag, 0], capacity + 1024)
 }

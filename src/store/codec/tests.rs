@@ -3,8 +3,8 @@
 use proptest::prelude::*;
 
 use super::*;
-use crate::mesh::edge_key;
 use crate::mesh::hierarchy::{Hierarchy, NodeId};
+use crate::mesh::{Cover, edge_key};
 
 fn id<K>(raw: u32) -> Id<K> {
     Id::from_raw(raw)
@@ -35,6 +35,25 @@ fn points<K>() -> IdVec<K, DVec3> {
 fn soup() -> Artifact {
     let faces = vec![Facet::Tri([id(0), id(1), id(2)]), Facet::Quad([id(0), id(1), id(3), id(2)])];
     Artifact::Soup(Arc::new(Soup { points: points(), faces: faces.into(), carried: carried() }))
+}
+
+fn quads(cover: Option<Cover>) -> Artifact {
+    let Artifact::Soup(mesh) = soup() else { unreachable!("made just here") };
+    Artifact::Quads(Arc::new(Quads { mesh: (*mesh).clone(), cover }))
+}
+
+#[test]
+fn quads_come_back_with_what_they_cover() {
+    let cover = Cover { surface: [7; 32], faces: vec![vec![id(0), id(2)], vec![id(1)]].into() };
+    for cover in [None, Some(cover)] {
+        let bytes = encode(&quads(cover.clone()));
+        let Artifact::Quads(after) = decode(&bytes).unwrap() else { panic!("quads went in") };
+        assert_eq!(after.cover, cover);
+        assert_eq!(encode(&Artifact::Quads(after)), bytes);
+        assert!((0..bytes.len()).all(|end| decode(&bytes[..end]).is_err()));
+    }
+    let short = Cover { surface: [7; 32], faces: vec![vec![id(0)]].into() };
+    assert!(decode(&encode(&quads(Some(short)))).is_err(), "one list of faces for two elements");
 }
 
 fn surface() -> Artifact {
