@@ -131,7 +131,7 @@ fn resolutions_reach_their_number_of_faces_and_carry_fields() {
     let hierarchy = hierarchy();
     let watch = Watch::silent();
     for faces in [900, 1500, 2200] {
-        let params = ResolutionParams { faces: Some(faces), share: None };
+        let params = ResolutionParams { faces: Some(faces), ..ResolutionParams::default() };
         let (mesh, stats) = resolution(&hierarchy, &params, &watch).unwrap();
         assert!(stats.target_reached && mesh.faces.len().abs_diff(faces) <= 1);
         assert_thresholds(&mesh);
@@ -141,11 +141,11 @@ fn resolutions_reach_their_number_of_faces_and_carry_fields() {
             assert!((value - p.x).abs() < 0.5);
         }
     }
-    let whole = ResolutionParams { faces: None, share: Some(Share(1.0)) };
+    let whole = ResolutionParams { share: Some(Share(1.0)), ..ResolutionParams::default() };
     let (mesh, stats) = resolution(&hierarchy, &whole, &watch).unwrap();
     assert_eq!(mesh, hierarchy.finest);
     assert_eq!(stats.front.distance_bound, Some(0.0));
-    let beyond = ResolutionParams { faces: Some(10), share: None };
+    let beyond = ResolutionParams { faces: Some(10), ..ResolutionParams::default() };
     assert!(!resolution(&hierarchy, &beyond, &watch).unwrap().1.target_reached);
     assert_eq!(resolution(&hierarchy, &ResolutionParams::default(), &watch), Err(ResolutionError::NotOne));
 }
@@ -206,6 +206,44 @@ fn a_field_asks_for_sizes() {
     assert_thresholds(&mesh);
     let count = |test: &dyn Fn(DVec3) -> bool| mesh.points.iter().filter(|p| test(**p)).count();
     assert!(count(&|p| p.x > 2.0) > 2 * count(&|p| p.x < -2.0), "{stats:?}");
+}
+
+#[test]
+fn values_of_points_without_faces_ask_for_sizes() {
+    let hierarchy = hierarchy();
+    let finest = &hierarchy.finest;
+    let values = finest.to_soup();
+    let mut cloud = Soup { points: finest.points.clone(), ..Soup::default() };
+    cloud.carried.set_field(values.carried.field(Support::Vertex, "x").expect("the torus has one").clone());
+    let asked = AdaptRegionParams {
+        field: Some("x".into()),
+        field_sizes: vec![(1.0, Length::Absolute(0.8)), (3.0, Length::Absolute(0.4))],
+        ..AdaptRegionParams::default()
+    };
+    let cut = |values: &Soup| adapt_region(&hierarchy, Some(values), &asked, &Watch::silent()).unwrap().0;
+    assert_eq!(cut(&cloud), cut(&values), "at the vertices both say the same");
+}
+
+#[test]
+fn a_polished_front_keeps_what_it_had_and_is_better() {
+    let hierarchy = hierarchy();
+    let cut = |polish| {
+        let asked = ResolutionParams { share: Some(Share(0.4)), polish, ..ResolutionParams::default() };
+        resolution(&hierarchy, &asked, &Watch::silent()).unwrap()
+    };
+    let ((plain, before), (mesh, after)) = (cut(false), cut(true));
+    let (before, after) = (before.front, after.front);
+    assert_thresholds(&mesh);
+    assert_eq!(mesh.faces.len(), plain.faces.len());
+    let work = after.polish.expect("polished");
+    assert!(before.polish.is_none() && work.flips + work.moves > 0);
+    assert_eq!((work.min_stretch_before, work.mean_stretch_before), (before.min_stretch, before.mean_stretch));
+    assert!(after.mean_stretch > before.mean_stretch + 0.01, "{} to {}", before.mean_stretch, after.mean_stretch);
+    assert!(after.min_stretch >= before.min_stretch * (1.0 - 2e-6));
+    assert!(after.max_valence <= before.max_valence && after.fold_overs == 0);
+    let (reach, reached) = (before.distance_bound.unwrap(), after.distance_bound.unwrap());
+    // Both are upper bounds with some slack.
+    assert!(reached <= 1.1 * reach, "{reached} beyond {reach}");
 }
 
 #[test]

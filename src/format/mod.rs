@@ -7,6 +7,7 @@
 mod bdf;
 mod binary;
 mod builder;
+mod csv;
 mod element;
 mod error;
 mod group_text;
@@ -57,6 +58,8 @@ pub enum Format {
     Bdf,
     /// Legacy VTK.
     Vtk,
+    /// Comma-separated points with values, no faces.
+    Csv,
 }
 
 /// What a format is and does; one beside each reader and writer.
@@ -156,6 +159,7 @@ impl Format {
         Self::Msh22,
         Self::Bdf,
         Self::Vtk,
+        Self::Csv,
     ];
 
     fn def(self) -> &'static FormatDef {
@@ -170,6 +174,7 @@ impl Format {
             Self::Msh22 => &msh::DEF_22,
             Self::Bdf => &bdf::DEF,
             Self::Vtk => &vtk::DEF,
+            Self::Csv => &csv::DEF,
         }
     }
 

@@ -7,7 +7,7 @@
 //! Generation, 2005, section 5.3.1.
 //!
 //! # Invariants
-//! Every face was seen while the hierarchy was recorded, so thresholds hold if they hold at the finest.
+//! Without `polish`, every face was seen while the hierarchy was recorded, so thresholds hold if they hold at the finest.
 //!
 //! # Cost
 //! O(n log n) in the nodes above the result; the reported distance costs more.
@@ -48,11 +48,21 @@ pub struct AdaptCurvatureParams {
     /// How sizes fall with curvature: 1 in proportion, above 1 faster, below 1 later. Default 1.
     #[schemars(range(min = 0.01, max = 100.0))]
     pub gamma: f64,
+    /// Betters the mesh by flips and relaxation, each certified: stretch, size, valence and distance stay within what the
+    /// mesh has without it. Its faces then are no longer those that were recorded. Default false.
+    pub polish: bool,
 }
 
 impl Default for AdaptCurvatureParams {
     fn default() -> Self {
-        Self { base: None, largest: None, smallest: Length::Absolute(0.0), percentile: Share(0.95), gamma: 1.0 }
+        Self {
+            base: None,
+            largest: None,
+            smallest: Length::Absolute(0.0),
+            percentile: Share(0.95),
+            gamma: 1.0,
+            polish: false,
+        }
     }
 }
 
@@ -110,7 +120,7 @@ pub fn adapt_curvature(
     }
     watch.phase("refine", None);
     front.refine_to(&thresholds, watch)?;
-    let (mesh, report) = extract_measured(&front, watch)?;
+    let (mesh, report) = extract_measured(&front, params.polish, watch)?;
     Ok((mesh, AdaptCurvatureStats { base_faces, largest, front: report }))
 }
 
@@ -130,7 +140,7 @@ pub struct Step;
 
 impl StepContract for Step {
     const NAME: &'static str = "adapt-curvature";
-    const REVISION: u32 = 1;
+    const REVISION: u32 = 2;
     const INPUTS: &'static [InputDef] = &[InputDef {
         name: "from",
         accepts: &[Port::Hierarchy],

@@ -7,7 +7,7 @@
 //! Generation, 2005, section 5.3.2.
 //!
 //! # Invariants
-//! Every face was seen while the hierarchy was recorded, so thresholds hold if they hold at the finest.
+//! Without `polish`, every face was seen while the hierarchy was recorded, so thresholds hold if they hold at the finest.
 //!
 //! # Cost
 //! O(n log n) in the nodes between the two fronts; the reported distance costs more.
@@ -49,6 +49,9 @@ pub struct AdaptDensityParams {
     /// mesh. With `like` it has no effect.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub base: Option<Resolution>,
+    /// Betters the mesh by flips and relaxation, each certified: stretch, size, valence and distance stay within what the
+    /// mesh has without it. Its faces then are no longer those that were recorded. Default false.
+    pub polish: bool,
 }
 
 /// What came out.
@@ -102,7 +105,7 @@ pub fn adapt_density(
     };
     density.move_to(&mut front, wanted, watch)?;
     let target_reached = front.face_count().abs_diff(wanted) <= (wanted / 100).max(4);
-    let (mesh, report) = extract_measured(&front, watch)?;
+    let (mesh, report) = extract_measured(&front, params.polish, watch)?;
     Ok((mesh, AdaptDensityStats { base_faces, target_reached, front: report }))
 }
 
@@ -133,7 +136,7 @@ pub struct Step;
 
 impl StepContract for Step {
     const NAME: &'static str = "adapt-density";
-    const REVISION: u32 = 1;
+    const REVISION: u32 = 2;
     const INPUTS: &'static [InputDef] = &[
         InputDef {
             name: "from",

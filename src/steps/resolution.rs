@@ -7,7 +7,7 @@
 //! Based on: H. Hoppe. Progressive meshes, SIGGRAPH 1996.
 //!
 //! # Invariants
-//! - Every face was seen while the hierarchy was recorded, so thresholds hold if they hold at the finest.
+//! - Without `polish`, every face was seen while the hierarchy was recorded, so thresholds hold if they hold at the finest.
 //! - The share `"100%"` is the finest mesh bit for bit.
 //!
 //! # Cost
@@ -38,6 +38,9 @@ pub struct ResolutionParams {
     /// The same as a share of the finest mesh's faces, such as `"25%"`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub share: Option<Share>,
+    /// Betters the mesh by flips and relaxation, each certified: stretch, size, valence and distance stay within what the
+    /// mesh has without it. Its faces then are no longer those that were recorded. Default false.
+    pub polish: bool,
 }
 
 /// What came out.
@@ -79,7 +82,7 @@ pub fn resolution(
     let front = Front::with_faces(hierarchy, wanted);
     // A collapse takes at most two faces.
     let target_reached = front.face_count() >= wanted && front.face_count() <= wanted.saturating_add(1);
-    let (mesh, report) = extract_measured(&front, watch)?;
+    let (mesh, report) = extract_measured(&front, params.polish, watch)?;
     Ok((mesh, ResolutionStats { target_reached, front: report }))
 }
 
@@ -98,7 +101,7 @@ pub struct Step;
 
 impl StepContract for Step {
     const NAME: &'static str = "resolution";
-    const REVISION: u32 = 1;
+    const REVISION: u32 = 2;
     const INPUTS: &'static [InputDef] = &[InputDef {
         name: "from",
         accepts: &[Port::Hierarchy],

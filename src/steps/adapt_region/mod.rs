@@ -7,7 +7,7 @@
 //! Generation, 2005, section 5.3.1.
 //!
 //! # Invariants
-//! Every face was seen while the hierarchy was recorded, so thresholds hold if they hold at the finest.
+//! Without `polish`, every face was seen while the hierarchy was recorded, so thresholds hold if they hold at the finest.
 //!
 //! # Cost
 //! O(n log n) in the nodes above the result; the reported distance costs more.
@@ -137,7 +137,7 @@ pub fn adapt_region(
         node.is_some_and(|node| hierarchy.element_size[node] > wishes.as_slice()[leaf])
     };
     let coarser = (0..hierarchy.leaf_count()).filter(|&leaf| is_coarser(leaf)).count();
-    let (mesh, report) = extract_measured(&front, watch)?;
+    let (mesh, report) = extract_measured(&front, params.polish, watch)?;
     Ok((mesh, AdaptRegionStats { base_faces, vertices_selected: selected, vertices_coarser: coarser, front: report }))
 }
 
@@ -202,7 +202,7 @@ pub struct Step;
 
 impl StepContract for Step {
     const NAME: &'static str = "adapt-region";
-    const REVISION: u32 = 1;
+    const REVISION: u32 = 2;
     const INPUTS: &'static [InputDef] = &[
         InputDef {
             name: "from",
@@ -214,7 +214,7 @@ impl StepContract for Step {
             name: "values",
             accepts: &[Port::Soup, Port::Surface],
             required: false,
-            doc: "a mesh with the field that `field` names, such as the result of an analysis",
+            doc: "a mesh, or the points of a CSV file, with the field that `field` names, such as the result of an analysis",
         },
     ];
     const OUTPUTS: &'static [OutputDef] = &[OutputDef { name: "main", port: OutPort::Is(Port::Surface) }];

@@ -71,4 +71,7 @@ pub struct AdaptRegionParams {
     /// Pairs of a value of the field and the size of elements there, `[[100, "4%"], [200, "1%"]]`, by rising value.
     /// Between two pairs sizes are interpolated; below the first one any size will do, above the last one its size holds.
     pub field_sizes: Vec<(f64, Length)>,
+    /// Betters the mesh by flips and relaxation, each certified: stretch, size, valence and distance stay within what the
+    /// mesh has without it. Its faces then are no longer those that were recorded. Default false.
+    pub polish: bool,
 }

@@ -146,27 +146,50 @@ pub(super) fn apply_field(
         name: name.to_owned(),
         known: list(carried.fields.iter().map(|field| &field.name)),
     })?;
-    let target = Target::of(values);
+    let nearest = Nearest::of(values, field);
     for (wish, &p) in wishes.iter_mut().zip(finest.points.iter()) {
-        let value = value_near(&target, values, field, p);
-        *wish = wish.min(size_at(&steps, value));
+        *wish = wish.min(size_at(&steps, nearest.value(p)));
     }
     Ok(())
 }
 
-/// The field at the closest point: that of the face, or of its corner closest to the point.
-fn value_near(target: &Target, values: &Soup, field: &Field, p: DVec3) -> f64 {
-    let Some(found) = target.bvh().closest(p) else { return f64::NAN };
-    let face = target.face(found.index);
-    let at = match field.support {
-        Support::Face => Some(face.index()),
-        Support::Vertex => {
-            let squared = |v: &VertexId| values.points[*v].distance_squared(found.nearest.point);
-            let corners = values.faces[face].corners().iter().copied();
-            corners.min_by(|a, b| squared(a).total_cmp(&squared(b)).then(a.cmp(b))).map(VertexId::index)
+/// Looks up a field at the closest point of a mesh, or at the closest of points without faces.
+struct Nearest<'a> {
+    values: &'a Soup,
+    field: &'a Field,
+    target: Option<Target>,
+    points: TriangleBvh,
+}
+
+impl<'a> Nearest<'a> {
+    fn of(values: &'a Soup, field: &'a Field) -> Self {
+        let has_faces = !values.faces.is_empty();
+        // A point is a triangle with its three corners in one place.
+        let points = if has_faces { Vec::new() } else { values.points.iter().map(|&p| [p; 3]).collect() };
+        Self { values, field, target: has_faces.then(|| Target::of(values)), points: TriangleBvh::new(points) }
+    }
+
+    fn value(&self, p: DVec3) -> f64 {
+        let at = match &self.target {
+            Some(target) => self.element(target, p),
+            None => self.points.closest(p).map(|found| found.index as usize),
+        };
+        at.and_then(|at| self.field.values.get(at)).copied().unwrap_or(f64::NAN)
+    }
+
+    /// The closest face, or its corner closest to the point.
+    fn element(&self, target: &Target, p: DVec3) -> Option<usize> {
+        let found = target.bvh().closest(p)?;
+        let face = target.face(found.index);
+        match self.field.support {
+            Support::Face => Some(face.index()),
+            Support::Vertex => {
+                let squared = |v: &VertexId| self.values.points[*v].distance_squared(found.nearest.point);
+                let corners = self.values.faces[face].corners().iter().copied();
+                corners.min_by(|a, b| squared(a).total_cmp(&squared(b)).then(a.cmp(b))).map(VertexId::index)
+            }
         }
-    };
-    at.and_then(|at| field.values.get(at)).copied().unwrap_or(f64::NAN)
+    }
 }
 
 /// The size for a value; infinite below the first step and where there is no value.

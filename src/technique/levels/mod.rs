@@ -6,7 +6,9 @@
 //! Generation, 2005, section 5. The forest itself and its fronts are in [`crate::technique::hierarchy`].
 
 mod build;
+mod polish;
 mod report;
 
 pub use build::{Recorded, Source, build};
+pub use polish::PolishReport;
 pub use report::{FrontReport, HierarchyReport, extract_measured};

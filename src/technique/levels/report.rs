@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use super::polish::{PolishReport, polish};
 use crate::mesh::geometry::triangle_normal;
 use crate::mesh::hierarchy::NodeId;
 use crate::mesh::topology::EdgeTable;
@@ -42,6 +43,9 @@ pub struct FrontReport {
     /// Certified upper bound of the two-sided distance to the finest mesh, in mesh units.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub distance_bound: Option<f64>,
+    /// What polishing did, where it was asked for; the figures above are those after it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub polish: Option<PolishReport>,
 }
 
 /// A hierarchy, measured at its finest end. Thresholds that hold there hold on every front.
@@ -77,37 +81,66 @@ impl HierarchyReport {
     }
 }
 
-fn shape(mesh: &Surface) -> Recount {
-    let no_limits = Limits { min_stretch: 0.0, max_size: SizeField::Uniform(f64::INFINITY), max_valence: usize::MAX };
-    recount(mesh, &ResolvedFreedom::free(mesh), &no_limits)
+/// What thresholds are asked of.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Shape {
+    pub(super) min_stretch: f64,
+    pub(super) mean_stretch: f64,
+    pub(super) max_size: f64,
+    pub(super) max_valence: usize,
 }
 
-/// The mesh of a front with the fields of the finest one, and its report.
-pub fn extract_measured(front: &Front<'_>, watch: &Watch) -> Result<(Surface, FrontReport), Cancelled> {
+fn shape(mesh: &Surface) -> Shape {
+    let no_limits = Limits { min_stretch: 0.0, max_size: SizeField::Uniform(f64::INFINITY), max_valence: usize::MAX };
+    let Recount { min_stretch, mean_stretch, max_size, max_valence, .. } =
+        recount(mesh, &ResolvedFreedom::free(mesh), &no_limits);
+    Shape { min_stretch, mean_stretch, max_size, max_valence }
+}
+
+/// The mesh of a front with the fields of the finest one, polished where asked, and its report.
+pub fn extract_measured(
+    front: &Front<'_>,
+    is_polished: bool,
+    watch: &Watch,
+) -> Result<(Surface, FrontReport), Cancelled> {
     watch.phase("extract", None);
     let finest = &front.hierarchy().finest;
     let mut mesh = extract(front);
-    inherit_fields(finest, &mut mesh);
     watch.check()?;
-    let counted = shape(&mesh);
-    watch.phase("distance to the finest mesh", None);
-    let distance = if front.face_count() == finest.faces.len() {
-        Some(0.0)
-    } else {
-        two_sided(&Target::of(&mesh.to_soup()), &Target::of(&finest.to_soup()), watch)?.map(|both| both.upper())
-    };
+    let (mut counted, mut bound) = (shape(&mesh), distance_bound(&mesh, front, watch)?);
+    let mut polished = None;
+    if let Some(reach) = bound.filter(|&reach| is_polished && reach > 0.0) {
+        watch.phase("polish", None);
+        if let Some((better, report)) = polish(&mesh, finest, counted, reach, watch)? {
+            (mesh, polished) = (better, Some(report));
+            (counted, bound) = (shape(&mesh), distance_bound(&mesh, front, watch)?);
+        }
+    }
+    inherit_fields(finest, &mut mesh);
+    let Shape { min_stretch, mean_stretch, max_size, max_valence } = counted;
     let report = FrontReport {
         vertices: mesh.points.len(),
         faces: mesh.faces.len(),
         finest_faces: finest.faces.len(),
-        min_stretch: counted.min_stretch,
-        mean_stretch: counted.mean_stretch,
-        max_size: counted.max_size,
-        max_valence: counted.max_valence,
+        min_stretch,
+        mean_stretch,
+        max_size,
+        max_valence,
         fold_overs: fold_overs(front, &mesh),
-        distance_bound: distance,
+        distance_bound: bound,
+        polish: polished,
     };
     Ok((mesh, report))
+}
+
+/// The certified distance to the finest mesh; 0 for the finest mesh itself.
+fn distance_bound(mesh: &Surface, front: &Front<'_>, watch: &Watch) -> Result<Option<f64>, Cancelled> {
+    let finest = &front.hierarchy().finest;
+    if front.face_count() == finest.faces.len() {
+        return Ok(Some(0.0));
+    }
+    watch.phase("distance to the finest mesh", None);
+    Ok(two_sided(&Target::of(&mesh.to_soup()), &Target::of(&finest.to_soup()), watch)?.map(|both| both.upper()))
 }
 
 /// Folded edges of the front's mesh that no folded edge of the finest mesh has become.
