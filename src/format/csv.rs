@@ -79,7 +79,7 @@ fn read(bytes: &[u8], watch: &Watch) -> ReadResult {
 /// The most frequent of the usual separators on the first line.
 fn delimiter(bytes: &[u8]) -> u8 {
     let line = bytes.split(|&b| b == b'\n').next().unwrap_or_default();
-    let count = |mark: u8| line.iter().filter(|&&b| b == mark).count();
+    let count = |mark: u8| line.split(|&b| b == mark).count();
     [b',', b';', b'\t'].into_iter().rev().max_by_key(|&mark| count(mark)).unwrap_or(b',')
 }
 
