@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::super::binary::ByteOrder;
+use super::super::binary::{ByteOrder, Scalar};
 use super::super::error::{FormatError, Place, Reason};
 use super::super::text::{Scanner, parse_integer};
 use super::{EDGE_GROUP, FACE_GROUP, REGION, VERTEX_GROUP};
@@ -15,49 +15,6 @@ const MOST_PROPERTIES: usize = 4096;
 pub(super) enum Encoding {
     Text,
     Binary(ByteOrder),
-}
-
-/// The type of a number.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Scalar {
-    I8,
-    U8,
-    I16,
-    U16,
-    I32,
-    U32,
-    I64,
-    U64,
-    F32,
-    F64,
-}
-
-impl Scalar {
-    /// Bytes in a binary file.
-    pub(super) fn size(self) -> usize {
-        match self {
-            Self::I8 | Self::U8 => 1,
-            Self::I16 | Self::U16 => 2,
-            Self::I32 | Self::U32 | Self::F32 => 4,
-            Self::I64 | Self::U64 | Self::F64 => 8,
-        }
-    }
-
-    fn from_name(name: &[u8]) -> Option<Self> {
-        Some(match name {
-            b"char" | b"int8" => Self::I8,
-            b"uchar" | b"uint8" => Self::U8,
-            b"short" | b"int16" => Self::I16,
-            b"ushort" | b"uint16" => Self::U16,
-            b"int" | b"int32" => Self::I32,
-            b"uint" | b"uint32" => Self::U32,
-            b"int64" => Self::I64,
-            b"uint64" => Self::U64,
-            b"float" | b"float32" => Self::F32,
-            b"double" | b"float64" => Self::F64,
-            _ => return None,
-        })
-    }
 }
 
 /// A number, or a list with a count before it.
@@ -171,7 +128,7 @@ fn read_property(scanner: &mut Scanner<'_>, element: Option<&mut Element>) -> Re
     }
     let mut scalar = || {
         let word = scanner.word_on_line().unwrap_or_default();
-        (word, Scalar::from_name(word))
+        (word, scalar_named(word))
     };
     let unknown = |word: &[u8]| FormatError::unexpected(place, "a type of numbers", word);
     let (list, scalar) = match scalar() {
@@ -200,4 +157,21 @@ fn read_name(scanner: &mut Scanner<'_>, head: &mut Head) {
     if let Ok(number) = parse_integer(number, "a number", Place::File) {
         names.insert(number, String::from_utf8_lossy(scanner.rest_of_line()).into_owned());
     }
+}
+
+/// The type that a header calls `name`.
+fn scalar_named(name: &[u8]) -> Option<Scalar> {
+    Some(match name {
+        b"char" | b"int8" => Scalar::I8,
+        b"uchar" | b"uint8" => Scalar::U8,
+        b"short" | b"int16" => Scalar::I16,
+        b"ushort" | b"uint16" => Scalar::U16,
+        b"int" | b"int32" => Scalar::I32,
+        b"uint" | b"uint32" => Scalar::U32,
+        b"int64" => Scalar::I64,
+        b"uint64" => Scalar::U64,
+        b"float" | b"float32" => Scalar::F32,
+        b"double" | b"float64" => Scalar::F64,
+        _ => return None,
+    })
 }

@@ -5,11 +5,11 @@ use std::collections::BTreeMap;
 use glam::DVec3;
 
 use super::super::ReadResult;
-use super::super::binary::{ByteReader, finite};
+use super::super::binary::{ByteReader, Scalar, finite};
 use super::super::builder::{Builder, MOST_GROUPS};
 use super::super::error::{FormatError, Place, Reason};
 use super::super::text::{Scanner, claim, parse_number};
-use super::head::{Element, Encoding, Head, Names, Property, Scalar, read_head};
+use super::head::{Element, Encoding, Head, Names, Property, read_head};
 use crate::mesh::{Field, Regions, Support, VertexId};
 use crate::watch::Watch;
 

@@ -12,7 +12,7 @@ use std::io::Read;
 use flate2::read::ZlibDecoder;
 use roxmltree::Node;
 
-use super::super::binary::{ByteOrder, ByteReader};
+use super::super::binary::{ByteOrder, ByteReader, Scalar};
 use super::super::error::{FormatError, Place, Reason};
 use super::super::vtk::model::{Array, Values};
 
@@ -63,41 +63,21 @@ impl Packing {
     }
 }
 
-/// The types of numbers that a file may hold.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Number {
-    I8,
-    U8,
-    I16,
-    U16,
-    I32,
-    U32,
-    I64,
-    U64,
-    F32,
-    F64,
-}
-
-impl Number {
-    fn named(name: &str) -> Option<Self> {
-        Some(match name {
-            "Int8" => Self::I8,
-            "UInt8" => Self::U8,
-            "Int16" => Self::I16,
-            "UInt16" => Self::U16,
-            "Int32" => Self::I32,
-            "UInt32" => Self::U32,
-            "Int64" => Self::I64,
-            "UInt64" => Self::U64,
-            "Float32" => Self::F32,
-            "Float64" => Self::F64,
-            _ => return None,
-        })
-    }
-
-    fn is_float(self) -> bool {
-        matches!(self, Self::F32 | Self::F64)
-    }
+/// The type that an attribute calls `name`.
+fn scalar_named(name: &str) -> Option<Scalar> {
+    Some(match name {
+        "Int8" => Scalar::I8,
+        "UInt8" => Scalar::U8,
+        "Int16" => Scalar::I16,
+        "UInt16" => Scalar::U16,
+        "Int32" => Scalar::I32,
+        "UInt32" => Scalar::U32,
+        "Int64" => Scalar::I64,
+        "UInt64" => Scalar::U64,
+        "Float32" => Scalar::F32,
+        "Float64" => Scalar::F64,
+        _ => return None,
+    })
 }
 
 /// Binary data, which ends at `end` bytes of the file.
@@ -128,7 +108,7 @@ impl Source<'_> {
 impl<'a> Encoding<'a> {
     /// The array that `node` describes; `None` when its type is text or unknown.
     pub(super) fn array(&mut self, node: Node<'_, '_>) -> Result<Option<Array>, FormatError> {
-        let Some(number) = node.attribute("type").and_then(Number::named) else { return Ok(None) };
+        let Some(number) = node.attribute("type").and_then(scalar_named) else { return Ok(None) };
         let place = Place::Byte(node.range().start as u64);
         let components = match node.attribute("NumberOfComponents") {
             None | Some("") => 1,
@@ -176,7 +156,7 @@ impl<'a> Encoding<'a> {
         })
     }
 
-    fn text(&self, node: Node<'_, '_>, number: Number) -> Result<Values, FormatError> {
+    fn text(&self, node: Node<'_, '_>, number: Scalar) -> Result<Values, FormatError> {
         let (mut ints, mut floats) = (Vec::new(), Vec::new());
         for child in node.children().filter(Node::is_text) {
             let text = child.text().unwrap_or("");
@@ -196,7 +176,7 @@ impl<'a> Encoding<'a> {
         Ok(if number.is_float() { Values::Float(floats) } else { Values::Int(ints) })
     }
 
-    fn binary(&mut self, mut source: Source<'_>, number: Number) -> Result<Values, FormatError> {
+    fn binary(&mut self, mut source: Source<'_>, number: Scalar) -> Result<Values, FormatError> {
         let place = source.place();
         if source.is_blank() {
             return decode(&[], number, self.order, place);
@@ -250,7 +230,7 @@ impl Source<'_> {
     }
 }
 
-fn decode(bytes: &[u8], number: Number, order: ByteOrder, place: Place) -> Result<Values, FormatError> {
+fn decode(bytes: &[u8], number: Scalar, order: ByteOrder, place: Place) -> Result<Values, FormatError> {
     macro_rules! numbers {
         ($kind:ty, $value:ty) => {
             bytes
@@ -267,16 +247,16 @@ fn decode(bytes: &[u8], number: Number, order: ByteOrder, place: Place) -> Resul
         };
     }
     Ok(match number {
-        Number::U8 => Values::Bytes(bytes.to_vec()),
-        Number::I8 => Values::Int(numbers!(i8, i64)),
-        Number::I16 => Values::Int(numbers!(i16, i64)),
-        Number::U16 => Values::Int(numbers!(u16, i64)),
-        Number::I32 => Values::Int(numbers!(i32, i64)),
-        Number::U32 => Values::Int(numbers!(u32, i64)),
-        Number::I64 => Values::Int(numbers!(i64, i64)),
-        Number::F32 => Values::Float(numbers!(f32, f64)),
-        Number::F64 => Values::Float(numbers!(f64, f64)),
-        Number::U64 => {
+        Scalar::U8 => Values::Bytes(bytes.to_vec()),
+        Scalar::I8 => Values::Int(numbers!(i8, i64)),
+        Scalar::I16 => Values::Int(numbers!(i16, i64)),
+        Scalar::U16 => Values::Int(numbers!(u16, i64)),
+        Scalar::I32 => Values::Int(numbers!(i32, i64)),
+        Scalar::U32 => Values::Int(numbers!(u32, i64)),
+        Scalar::I64 => Values::Int(numbers!(i64, i64)),
+        Scalar::F32 => Values::Float(numbers!(f32, f64)),
+        Scalar::F64 => Values::Float(numbers!(f64, f64)),
+        Scalar::U64 => {
             let wide: Vec<u64> = numbers!(u64, u64);
             let fit: Result<Vec<i64>, _> = wide.into_iter().map(i64::try_from).collect();
             let large = |_| FormatError::unexpected(place, "an integer below 2^63", b"a larger one");
