@@ -233,9 +233,12 @@ proptest! {
         prop_assert_eq!(places(coarse, "some"), places(&dense, "some"));
         let (before, after) = (measured(&dense.to_soup()), measured(&coarse.to_soup()));
         let limit = |name: &str, asked: f64, best: fn(f64, f64) -> f64| best(before[name], asked);
-        // A threshold is reached, or the step says that it is not.
-        let unreached = done.stats["faces-violating"] != 0;
-        prop_assert!(after["min-stretch"] >= min_stretch - 1e-12 || unreached);
+        // A threshold that held everywhere holds; one that did not is reached, or the step says that it is not.
+        let unreached = before["min-stretch"] < min_stretch && done.stats["faces-violating"] != 0;
+        prop_assert!(
+            after["min-stretch"] >= min_stretch - 1e-12 || unreached,
+            "the least stretch was {}, is {}", before["min-stretch"], after["min-stretch"]
+        );
         let longest = f64::from(size) / 100.0 * before["diagonal"];
         prop_assert!(after["max-size"] <= limit("max-size", longest, f64::max) * (1.0 + 1e-12));
         prop_assert!(after["max-valence"] <= limit("max-valence", 12.0, f64::max));

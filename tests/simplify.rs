@@ -218,6 +218,33 @@ fn the_target_is_reached_in_every_mode() {
 }
 
 #[test]
+fn corners_closer_than_the_curves_tolerance_become_one() {
+    let mut mesh = cube(0);
+    let near = mesh.points.push(dvec3(5e-4, 0.0, 0.0));
+    let [origin, along] = [VertexId::new(0), VertexId::new(1)];
+    for face in mesh.faces.ids().collect::<Vec<_>>() {
+        let corners = mesh.faces[face];
+        if corners.contains(&origin) && corners.contains(&along) {
+            mesh.faces[face] = corners.map(|v| if v == along { near } else { v });
+            mesh.faces.push(corners.map(|v| if v == origin { near } else { v }));
+        }
+    }
+    let mark = mesh.carried.marks.remove(&edge_key(origin, along)).expect("an edge of the cube");
+    mesh.carried.mark(edge_key(origin, near), mark);
+    mesh.carried.mark(edge_key(near, along), mark);
+    mesh.carried.pin(near, Freedom::Keep);
+    let dense =
+        meshmill::technique::refine::subdivide(&mesh, 3, 1_000_000, &LockRules::default(), &Watch::silent()).unwrap().0;
+    let (result, stats) = control(&dense, &tolerance(0.01));
+    let at = mesh.points[near];
+    let has_both = |mesh: &Surface| mesh.points.iter().filter(|p| p.distance(at) < 1e-3).count() > 1;
+    assert!(stats.min_stretch >= 0.2 && !has_both(&result), "{stats:?}");
+    assert_eq!(euler(&result), 2);
+    let strict = ControlPropertiesParams { feature_tolerance: Some(Length::Absolute(1e-4)), ..tolerance(0.01) };
+    assert!(has_both(&control(&dense, &strict).0), "the curves' tolerance forbids it");
+}
+
+#[test]
 fn equal_input_gives_equal_output() {
     let mesh = sphere(3);
     assert_eq!(control(&mesh, &tolerance(0.02)).0, control(&mesh, &tolerance(0.02)).0);

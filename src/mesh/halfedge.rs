@@ -387,6 +387,11 @@ impl HalfedgeMesh {
         self.face_class[f]
     }
 
+    /// Whether a vertex or an edge at it belongs to a group of its own kind.
+    pub fn is_grouped(&self, v: VertexId) -> bool {
+        self.vertex_class[v] != 0 || self.outgoing(v).any(|h| self.edge_class[edge_of(h)] != 0)
+    }
+
     /// The seam a vertex lies on.
     pub fn seam(&self, v: VertexId) -> Option<SeamId> {
         self.seams.get(&v).copied()

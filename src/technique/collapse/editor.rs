@@ -5,20 +5,19 @@
 //! once; one that does not leaves no trace. Stretch and size of every live face are kept up to date beside the mesh.
 
 use glam::DVec3;
-use rustc_hash::FxHashMap;
 
 use super::collision::Collision;
 use super::keeper::Keeper;
 use super::limits::{Limits, least_stretch};
 use super::placement::{Order, Site};
 use super::priority::{Priority, Tally};
+use super::quadrics::Quadrics;
 use crate::mesh::edit::collapse::Ring;
 use crate::mesh::edit::{CollapsePlan, Placement, check_collapse, collapse};
 use crate::mesh::geometry::{area_vector, stretch, triangle_size};
-use crate::mesh::halfedge::{HalfedgeMesh, edge_of, halfedge_of, twin};
+use crate::mesh::halfedge::{HalfedgeMesh, edge_of, twin};
 use crate::mesh::{EdgeId, FaceId, Freedom, VertexId};
 use crate::technique::hierarchy::Recorder;
-use crate::technique::quadric::Quadric;
 
 /// Faces may turn by at most 45 degrees in one edit.
 const LEAST_TURN_COSINE: f64 = std::f64::consts::FRAC_1_SQRT_2;
@@ -94,14 +93,6 @@ impl Patch {
     }
 }
 
-/// Plane and line quadrics of the vertices, about a local origin.
-#[derive(Debug, Default)]
-struct Quadrics {
-    origin: DVec3,
-    planes: Vec<Quadric>,
-    lines: FxHashMap<VertexId, Quadric>,
-}
-
 /// A workshop with guards.
 #[derive(Debug)]
 pub struct Editor<'a> {
@@ -110,7 +101,7 @@ pub struct Editor<'a> {
     pub(in crate::technique) limits: Limits,
     pub(in crate::technique) counts: Counts,
     collision: Collision,
-    quadrics: Quadrics,
+    pub(in crate::technique) quadrics: Quadrics,
     stretch: Vec<f32>,
     size: Vec<f32>,
     pub(in crate::technique) patch: Patch,
@@ -227,19 +218,6 @@ impl<'a> Editor<'a> {
             }
         }
         None
-    }
-
-    /// Collapses the edge into a vertex at `p`, where all tests admit that.
-    pub fn try_collapse_at(&mut self, edge: EdgeId, p: DVec3, rules: &CollapseRules) -> Option<VertexId> {
-        let plan = check_collapse(&self.mesh, edge).ok()?;
-        let (site, before) = self.prepare_collapse(&plan, rules)?;
-        let p = plan.placement.nearest(p);
-        self.assess(&plan, &site, &before, p, rules)?;
-        if !(self.curve_admits(&plan, p) && self.patch_admitted()) {
-            return None;
-        }
-        self.apply_collapse(&plan, p);
-        Some(plan.kept)
     }
 
     /// Fills the patch with the star of the edge; the merged vertex's corner comes first in each new face.
@@ -425,75 +403,5 @@ impl<'a> Editor<'a> {
     /// Whether the collapse of an edge may place its vertex anywhere.
     pub fn is_free_edge(&self, edge: EdgeId) -> bool {
         check_collapse(&self.mesh, edge).is_ok_and(|plan| plan.placement == Placement::Anywhere)
-    }
-}
-
-impl Quadrics {
-    fn new(mesh: &HalfedgeMesh, feature_weight: f64) -> Self {
-        let bounds = crate::mesh::geometry::Aabb::of(mesh.vertices().map(|v| mesh.point(v)));
-        let origin = if bounds.is_empty() { DVec3::ZERO } else { bounds.centre() };
-        let mut this =
-            Self { origin, planes: vec![Quadric::default(); mesh.vertex_slots()], lines: FxHashMap::default() };
-        for f in mesh.faces() {
-            if let Some(plane) = this.plane(mesh, f) {
-                for v in mesh.corners(f) {
-                    this.planes[v.index()].add(&plane);
-                }
-            }
-        }
-        for e in mesh.edges().filter(|&e| mesh.edge_freedom(e) != Freedom::Free) {
-            let [a, b] = mesh.ends(e);
-            let (p, q) = (mesh.point(a) - origin, mesh.point(b) - origin);
-            if let Some(direction) = (q - p).try_normalize() {
-                let line = Quadric::line(direction, p, feature_weight * sharpness(mesh, e));
-                this.lines.entry(a).or_default().add(&line);
-                this.lines.entry(b).or_default().add(&line);
-            }
-        }
-        this
-    }
-
-    fn plane(&self, mesh: &HalfedgeMesh, f: FaceId) -> Option<Quadric> {
-        let corners = mesh.corner_points(f).map(|p| p - self.origin);
-        area_vector(corners).try_normalize().map(|n| Quadric::plane(n, corners[0]))
-    }
-
-    fn planes(&self, v: VertexId) -> Quadric {
-        self.planes[v.index()]
-    }
-
-    fn lines(&self, v: VertexId) -> Quadric {
-        self.lines.get(&v).copied().unwrap_or_default()
-    }
-
-    fn merge(&mut self, gone: VertexId, kept: VertexId) {
-        let planes = self.planes[gone.index()];
-        self.planes[kept.index()].add(&planes);
-        if let Some(lines) = self.lines.remove(&gone) {
-            self.lines.entry(kept).or_default().add(&lines);
-        }
-    }
-
-    fn found(&mut self, mesh: &HalfedgeMesh, v: VertexId) {
-        if v.index() >= self.planes.len() {
-            self.planes.resize(v.index() + 1, Quadric::default());
-        }
-        let mut sum = Quadric::default();
-        for f in mesh.faces_around(v) {
-            if let Some(plane) = self.plane(mesh, f) {
-                sum.add(&plane);
-            }
-        }
-        self.planes[v.index()] = sum;
-    }
-}
-
-/// Half of 1 − n·m: 0 where flat, 1 where folded; never below 0.05, so that flat marked edges hold too; 1 on rims.
-fn sharpness(mesh: &HalfedgeMesh, e: EdgeId) -> f64 {
-    let h = halfedge_of(e);
-    let normal = |side| mesh.face(side).and_then(|f| area_vector(mesh.corner_points(f)).try_normalize());
-    match (normal(h), normal(twin(h))) {
-        (Some(m), Some(n)) => (0.5 * (1.0 - m.dot(n))).max(0.05),
-        _ => 1.0,
     }
 }

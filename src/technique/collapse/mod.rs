@@ -17,12 +17,14 @@
 //! Cost: O(F log F), about 20 ratings a collapse.
 
 pub mod collision;
+mod corners;
 pub mod editor;
 pub mod envelope;
 pub mod keeper;
 pub mod limits;
 pub mod placement;
 pub mod priority;
+pub mod quadrics;
 pub mod session;
 
 use crate::mesh::{EdgeId, VertexId};

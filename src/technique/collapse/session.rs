@@ -3,12 +3,11 @@
 //! A step never claims a threshold: [`recount`] measures the result anew and names the faces that break one, with the
 //! cause where geometry or the user forbids better.
 
-use std::collections::BTreeMap;
-
 use glam::DVec3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::corners::free_close_corners;
 use super::editor::Editor;
 use super::envelope::Envelope;
 use super::keeper::{Curves, Keeper};
@@ -16,7 +15,7 @@ use super::limits::{Limits, SizeField};
 use crate::mesh::bvh::TriangleBvh;
 use crate::mesh::geometry::{Aabb, angle, stretch, triangle_size};
 use crate::mesh::halfedge::{EnterError, HalfedgeMesh};
-use crate::mesh::{EdgeKey, FaceId, Freedom, IdVec, ResolvedFreedom, Surface, VertexId, edge_key};
+use crate::mesh::{FaceId, Freedom, IdVec, ResolvedFreedom, Surface, VertexId, edge_key};
 
 /// What a tolerance means.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -73,11 +72,12 @@ pub fn open<'a>(
     tree: &'a TriangleBvh,
     setup: Setup,
 ) -> Result<Editor<'a>, EnterError> {
-    let mut freedom = freedom.clone();
-    if setup.may_merge_corners {
-        free_close_corners(surface, &mut freedom, setup.feature_tolerance);
+    let mut mesh = HalfedgeMesh::new(surface, freedom)?;
+    if setup.may_merge_corners
+        && let Some(loosened) = free_close_corners(&mesh, freedom, setup.feature_tolerance)
+    {
+        mesh = HalfedgeMesh::new(surface, &loosened)?;
     }
-    let mesh = HalfedgeMesh::new(surface, &freedom)?;
     let keeper = match setup.mode {
         ToleranceMode::QuadricSum => Keeper::QuadricSum { most: setup.tolerance, weight: setup.feature_weight },
         ToleranceMode::QuadricRms => Keeper::QuadricRms { most: setup.tolerance },
@@ -90,38 +90,6 @@ pub fn open<'a>(
         }
     };
     Ok(Editor::new(mesh, keeper, setup.limits, setup.feature_weight))
-}
-
-/// Of two corners joined by an edge shorter than `reach`, lets the one with fewer curves slide into the other: both
-/// kept would force slivers of that size. The curves that end there stay within reach of where they were.
-fn free_close_corners(surface: &Surface, freedom: &mut ResolvedFreedom, reach: f64) {
-    let mut curves: BTreeMap<VertexId, (u32, bool)> = BTreeMap::new();
-    let mut short: Vec<(f64, EdgeKey)> = Vec::new();
-    for &key in surface.carried.marks.keys() {
-        let is_kept = freedom.edge(key) == Freedom::Keep;
-        for v in key {
-            let entry = curves.entry(v).or_default();
-            *entry = (entry.0 + 1, entry.1 || is_kept);
-        }
-    }
-    for [a, b, c] in &surface.faces {
-        for key in [edge_key(*a, *b), edge_key(*b, *c), edge_key(*c, *a)] {
-            let length = surface.points[key[0]].distance(surface.points[key[1]]);
-            if length <= reach && freedom.edge(key) != Freedom::Keep {
-                short.push((length, key));
-            }
-        }
-    }
-    short.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-    for (_, [a, b]) in short {
-        let at = |v: VertexId| curves.get(&v).copied().unwrap_or_default();
-        let [weak, strong] = if (at(a).0, b) < (at(b).0, a) { [a, b] } else { [b, a] };
-        let both_kept = [weak, strong].iter().all(|&v| freedom.vertices[v] == Freedom::Keep);
-        if both_kept && !at(weak).1 {
-            freedom.vertices[weak] = Freedom::OnCurve;
-            freedom.make_curve(edge_key(weak, strong));
-        }
-    }
 }
 
 /// The curves that marked edges are held against: the reference's own where it has any, and those of the mesh.

@@ -6,11 +6,14 @@
 //!
 //! [`raise_stretch`] repairs the faces below a threshold before and after.
 
+mod cavity;
+mod edit;
 mod ops;
 mod raise;
+mod search;
 
 pub use ops::Gain;
-pub use raise::{faces_below, raise_stretch};
+pub use raise::{faces_below, raise_stretch, touch_up};
 
 use glam::DVec3;
 
@@ -28,6 +31,10 @@ const LESS_COMFORT: [(f64, f64); 2] = [(0.4, 0.65), (0.3, 0.5)];
 
 /// The part of the faces that must be gone for the further steps to be left out.
 const COARSENED: f64 = 0.25;
+
+/// What optimised faces should reach beyond the threshold asked for, with all means, and with single edits.
+const GOOD: f64 = 0.35;
+const BETTER: f64 = 0.45;
 
 /// Rounds of flips and relaxation between collapses, and at the end.
 const ROUNDS: [usize; 2] = [2, 8];
@@ -62,9 +69,10 @@ pub fn coarsen(
         optimise(editor, 1, watch)?;
     }
     optimise(editor, ROUNDS[1], watch)?;
-    for threshold in [rules.min_stretch, 0.35_f64.max(rules.min_stretch), 0.45_f64.max(rules.min_stretch)] {
+    for threshold in [rules.min_stretch, GOOD.max(rules.min_stretch)] {
         raise_stretch(editor, threshold, rules, watch)?;
     }
+    touch_up(editor, BETTER.max(rules.min_stretch), rules, watch)?;
     Ok(ending)
 }
 

@@ -13,6 +13,9 @@ use crate::technique::collapse::{Editor, Keeper};
 /// Without a certified distance, an edge is flipped only where its faces differ by less than 5 degrees.
 const FLAT_COSINE: f64 = 0.996;
 
+/// What a split may leave of a stretch that is below the threshold already.
+const SPLIT_LOSS: f64 = 0.25;
+
 /// When an edit is worth it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Gain {
@@ -85,7 +88,8 @@ impl Editor<'_> {
         })
     }
 
-    /// Splits the edge at `at` where all tests admit it.
+    /// Splits the edge at `at` where all tests admit it, and no face falls below the least stretch; where one is there
+    /// already, the halves may be a little worse, since more can be done with them.
     pub fn try_split(&mut self, edge: EdgeId, at: DVec3) -> Option<VertexId> {
         let plan = check_split(&self.mesh, edge).ok()?;
         let h = halfedge_of(edge);
@@ -122,7 +126,7 @@ impl Editor<'_> {
             self.patch.corners.push(corners);
             self.patch.points.push(points);
         }
-        if self.split_folds() || !self.patch_admitted() {
+        if !self.split_keeps_stretch() || self.split_folds() || !self.patch_admitted() {
             return None;
         }
         let v = split(&mut self.mesh, &plan, at);
@@ -130,6 +134,14 @@ impl Editor<'_> {
         self.counts.splits += 1;
         self.settle();
         Some(v)
+    }
+
+    fn split_keeps_stretch(&self) -> bool {
+        let before = self.patch.old.iter().map(|&f| self.stretch(f)).fold(f64::INFINITY, f64::min);
+        let limit = self.limits.min_stretch;
+        let floor = least_stretch(limit, before);
+        let floor = if floor < limit { SPLIT_LOSS * floor } else { floor };
+        self.patch.points.iter().all(|points| stretch(*points) >= floor)
     }
 
     fn split_folds(&self) -> bool {

@@ -2,38 +2,67 @@
 //!
 //! H. Date, S. Kanai, T. Kishinami, I. Nishigaki, T. Dohi (JCISE 5(4), 2005, section 5.2.1) ask for a first phase in
 //! which only edges that break the threshold collapse, until nothing does. Made precise: for each face below the
-//! threshold, worst first, the first of a collapse, a flip, a relocation, and a split of its long edge, that brings its
-//! star nearer to the threshold: the least stretch rises, or the sum of what the faces lack falls, and never does the
-//! least stretch fall.
+//! threshold, worst first, the first of a collapse, a flip and a relocation that brings its star nearer to the threshold:
+//! the least stretch rises, or the sum of what the faces lack falls, and never does the least stretch fall. Where there
+//! is none, a search for a sequence of edits whose outcome does ([`super::search`]).
+
+use std::collections::BTreeMap;
 
 use glam::DVec3;
 
+use super::search::mend_by_search;
 use super::{Gain, relax};
-use crate::mesh::geometry::{area_vector, stretch};
+use crate::mesh::geometry::{angle, area_vector, stretch};
 use crate::mesh::halfedge::edge_of;
 use crate::mesh::{EdgeId, FaceId, Freedom, VertexId};
+use crate::technique::collapse::session::best_stretch_at;
 use crate::technique::collapse::{CollapseRules, Editor};
 use crate::watch::{Cancelled, Watch};
 
 /// Rounds after which the phase ends even if it still finds something: each round gains, but ever less.
 const MOST_ROUNDS: usize = 24;
 
-/// Raises the stretch of the faces below `threshold`, worst first. Returns how many are left.
+/// Rounds of searching for what no single edit mends.
+const MOST_SEARCHES: usize = 4;
+
+/// Faces searched in one round, worst first: each costs as much as thousands of edits.
+const MOST_SEARCHED: usize = 400;
+
+/// A face this near to the best that its corner between two curves allows is left alone.
+const NEAR_BEST: f64 = 0.95;
+
+/// Raises the stretch of the faces below `threshold`, worst first, and where no single edit helps by a search for
+/// several. Returns how many are left.
 pub fn raise_stretch(
     editor: &mut Editor<'_>,
     threshold: f64,
     rules: &CollapseRules,
     watch: &Watch,
 ) -> Result<usize, Cancelled> {
+    let mut failed = BTreeMap::new();
+    for _ in 0..MOST_SEARCHES {
+        touch_up(editor, threshold, rules, watch)?;
+        if !search(editor, threshold, &mut failed, watch)? {
+            break;
+        }
+    }
+    Ok(faces_below(editor, threshold).len())
+}
+
+/// As [`raise_stretch`] by single edits only.
+pub fn touch_up(
+    editor: &mut Editor<'_>,
+    threshold: f64,
+    rules: &CollapseRules,
+    watch: &Watch,
+) -> Result<(), Cancelled> {
     let rules = CollapseRules { mend_below: Some(threshold), min_stretch: threshold, mean_stretch: 0.0, ..*rules };
-    let mut left = usize::MAX;
-    for _ in 0..MOST_ROUNDS {
+    for round in 0..MOST_ROUNDS {
         let bad = faces_below(editor, threshold);
-        if left == usize::MAX {
+        if round == 0 {
             watch.phase("raise stretch", Some(bad.len() as u64));
         }
-        left = bad.len();
-        watch.advance(0, || format!("{left} faces below {threshold}"));
+        watch.advance(0, || format!("{} faces below {threshold}", bad.len()));
         let mut gained = false;
         for (place, &f) in bad.iter().enumerate() {
             if place.is_multiple_of(64) {
@@ -47,7 +76,51 @@ pub fn raise_stretch(
             break;
         }
     }
-    Ok(faces_below(editor, threshold).len())
+    Ok(())
+}
+
+/// Searches at the faces that are left, except where that has failed and nothing has changed since. Returns whether it
+/// helped anywhere.
+fn search(
+    editor: &mut Editor<'_>,
+    threshold: f64,
+    failed: &mut BTreeMap<FaceId, u64>,
+    watch: &Watch,
+) -> Result<bool, Cancelled> {
+    let mut gained = false;
+    for f in faces_below(editor, threshold).into_iter().take(MOST_SEARCHED) {
+        watch.check()?;
+        let is_open = editor.mesh().face_is_live(f) && editor.stretch(f) < threshold && !is_near_best(editor, f);
+        if !is_open || failed.get(&f) == Some(&age(editor, f)) {
+            continue;
+        }
+        if mend_by_search(editor, f, threshold) {
+            gained = true;
+        } else {
+            failed.insert(f, age(editor, f));
+        }
+    }
+    Ok(gained)
+}
+
+/// Changes when the surroundings of a face change.
+fn age(editor: &Editor<'_>, f: FaceId) -> u64 {
+    let mesh = editor.mesh();
+    let around = mesh.corners(f).into_iter().flat_map(|v| mesh.neighbours(v));
+    around.map(|v| u64::from(mesh.version(v))).sum()
+}
+
+/// Whether curves meet in a corner of the face so sharply that it is about as good as it can be.
+fn is_near_best(editor: &Editor<'_>, f: FaceId) -> bool {
+    let mesh = editor.mesh();
+    let first = mesh.face_halfedge(f);
+    [first, mesh.next(first), mesh.prev(first)].into_iter().any(|h| {
+        let is_curve = |h| mesh.edge_freedom(edge_of(h)) != Freedom::Free;
+        let at = mesh.point(mesh.origin(h));
+        let opening = angle(mesh.point(mesh.target(h)) - at, mesh.point(mesh.origin(mesh.prev(h))) - at);
+        let is_wedge = is_curve(h) && is_curve(mesh.prev(h)) && opening < 0.5;
+        is_wedge && editor.stretch(f) >= NEAR_BEST * best_stretch_at(opening)
+    })
 }
 
 /// The live faces with less stretch, worst first.
@@ -57,7 +130,7 @@ pub fn faces_below(editor: &Editor<'_>, threshold: f64) -> Vec<FaceId> {
     bad
 }
 
-/// One edit that raises the least stretch round a face: collapse, flip, relocation, split of its longest edge.
+/// One edit that raises the least stretch round a face: collapse, flip, relocation.
 fn mend(editor: &mut Editor<'_>, f: FaceId, rules: &CollapseRules) -> bool {
     let edges = edges_by_length(editor, f);
     if edges.iter().any(|&e| editor.try_collapse(e, rules).is_some()) {
@@ -83,69 +156,7 @@ fn mend(editor: &mut Editor<'_>, f: FaceId, rules: &CollapseRules) -> bool {
             return true;
         }
     }
-    widen_wedge(editor, f, rules) || split_cap(editor, f, edges[2], rules)
-}
-
-/// Collapses two curve edges at once, one on each side of a narrow wedge between two curves: either alone makes things
-/// worse, but both together leave one face of the wedge's angle where there were several.
-fn widen_wedge(editor: &mut Editor<'_>, f: FaceId, rules: &CollapseRules) -> bool {
-    let threshold = rules.mend_below.unwrap_or(rules.min_stretch);
-    // The first of the two may make things worse: never where the limit holds.
-    if editor.stretch(f) >= editor.limits().min_stretch {
-        return false;
-    }
-    let curved: Vec<(VertexId, [VertexId; 2])> = editor
-        .mesh()
-        .corners(f)
-        .into_iter()
-        .filter(|&v| editor.mesh().vertex_freedom(v) == Freedom::OnCurve)
-        .filter_map(|v| Some((v, editor.curve_neighbours(v)?)))
-        .collect();
-    let mut best: Option<(f64, [(VertexId, VertexId); 2])> = None;
-    for (place, &(p, to_p)) in curved.iter().enumerate() {
-        for &(q, to_q) in &curved[place + 1..] {
-            for pair in to_p.into_iter().flat_map(|a| to_q.map(|b| [(p, a), (q, b)])) {
-                let rest = shortfall_after(editor, pair, threshold);
-                if rest.is_some_and(|rest| best.is_none_or(|(least, _)| rest < least)) {
-                    best = rest.map(|rest| (rest, pair));
-                }
-            }
-        }
-    }
-    let Some((_, [first, second])) = best else { return false };
-    // The first of the two alone may fall short by as much as the face does; the second must mend.
-    let loose = CollapseRules { min_stretch: 0.25 * editor.stretch(f), mend_below: None, ..*rules };
-    merge_into(editor, first, &loose) && {
-        merge_into(editor, second, rules);
-        true
-    }
-}
-
-/// Collapses the edge from a vertex to its neighbour on the curve, to where that is.
-fn merge_into(editor: &mut Editor<'_>, (from, to): (VertexId, VertexId), rules: &CollapseRules) -> bool {
-    // The first of two collapses may have taken an end of the second.
-    let are_live = [from, to].iter().all(|&v| editor.mesh().vertex_is_live(v));
-    let Some(h) = are_live.then(|| editor.mesh().find_halfedge(from, to)).flatten() else { return false };
-    let at = editor.mesh().point(to);
-    editor.try_collapse_at(edge_of(h), at, rules).is_some()
-}
-
-/// What the stars of two vertices would lack to the threshold, were each merged into its partner; `None` where that is
-/// no gain.
-fn shortfall_after(editor: &Editor<'_>, pair: [(VertexId, VertexId); 2], threshold: f64) -> Option<f64> {
-    let mesh = editor.mesh();
-    let mut faces: Vec<FaceId> = pair.iter().flat_map(|&(v, _)| mesh.faces_around(v)).collect();
-    faces.sort_unstable();
-    faces.dedup();
-    let (mut before, mut after) = (0.0, 0.0);
-    for f in faces {
-        before += (threshold - editor.stretch(f)).max(0.0);
-        let moved = mesh.corners(f).map(|v| pair.iter().find(|(from, _)| *from == v).map_or(v, |&(_, to)| to));
-        if moved[0] != moved[1] && moved[1] != moved[2] && moved[2] != moved[0] {
-            after += (threshold - stretch(moved.map(|v| mesh.point(v)))).max(0.0);
-        }
-    }
-    (after < before - 0.05 * threshold).then_some(after)
+    false
 }
 
 /// Steps of a nudge, as shares of the shortest edge at the vertex for a free one, of the way to the neighbour on a curve.
@@ -210,41 +221,6 @@ fn along_curve(editor: &Editor<'_>, v: VertexId) -> Vec<DVec3> {
     let at = mesh.point(v);
     let wishes = STEPS.into_iter().flat_map(|step| ends.map(|w| at + step * (mesh.point(w) - at)));
     wishes.filter_map(|wish| editor.keeper.project_to_curve(wish)).collect()
-}
-
-/// Splits the long edge of a cap at the foot of its height, and collapses the height.
-fn split_cap(editor: &mut Editor<'_>, f: FaceId, longest: EdgeId, rules: &CollapseRules) -> bool {
-    let mesh = editor.mesh();
-    let [a, b] = mesh.ends(longest);
-    let Some(apex) = mesh.corners(f).into_iter().find(|&v| v != a && v != b) else { return false };
-    let (p, q, r) = (mesh.point(a), mesh.point(b), mesh.point(apex));
-    let along = q - p;
-    let t = (r - p).dot(along) / along.length_squared().max(f64::MIN_POSITIVE);
-    if !(0.1..=0.9).contains(&t) {
-        return false;
-    }
-    let height = (r - (p + t * along)).length();
-    // Only caps: elsewhere a split makes things worse, and nothing would undo it.
-    if height > 0.2 * along.length() {
-        return false;
-    }
-    let before = editor.stretch(f);
-    let Some(foot) = editor.try_split(longest, p + t * along) else { return false };
-    let Some(h) = editor.mesh().find_halfedge(foot, apex) else { return false };
-    // The star of the height contains the halves of the cap, which are as bad as it was.
-    let rules = CollapseRules { min_stretch: before, ..*rules };
-    if editor.try_collapse(edge_of(h), &rules).is_some() {
-        return true;
-    }
-    // Undo: the foot goes back into an end of the edge.
-    let back: Vec<EdgeId> = editor.mesh().outgoing(foot).map(edge_of).collect();
-    let rules = CollapseRules { min_stretch: 0.0, mend_below: None, ..rules };
-    for e in back {
-        if editor.mesh().ends(e).iter().any(|&v| v == a || v == b) && editor.try_collapse(e, &rules).is_some() {
-            break;
-        }
-    }
-    false
 }
 
 /// The edges of a face, shortest first.

@@ -1,0 +1,98 @@
+//! The quadrics beside the workshop: the planes and lines of the input that each vertex has gathered.
+
+use glam::DVec3;
+use rustc_hash::FxHashMap;
+
+use crate::mesh::geometry::{Aabb, area_vector};
+use crate::mesh::halfedge::{HalfedgeMesh, halfedge_of, twin};
+use crate::mesh::{EdgeId, FaceId, Freedom, VertexId};
+use crate::technique::quadric::Quadric;
+
+/// Plane and line quadrics of the vertices, about a local origin.
+#[derive(Debug, Default)]
+pub struct Quadrics {
+    /// What the quadrics are about.
+    pub origin: DVec3,
+    planes: Vec<Quadric>,
+    lines: FxHashMap<VertexId, Quadric>,
+}
+
+impl Quadrics {
+    /// The quadrics of a fresh mesh. `feature_weight` is the weight of the sharpest marked edges.
+    pub fn new(mesh: &HalfedgeMesh, feature_weight: f64) -> Self {
+        let bounds = Aabb::of(mesh.vertices().map(|v| mesh.point(v)));
+        let origin = if bounds.is_empty() { DVec3::ZERO } else { bounds.centre() };
+        let mut this =
+            Self { origin, planes: vec![Quadric::default(); mesh.vertex_slots()], lines: FxHashMap::default() };
+        for f in mesh.faces() {
+            if let Some(plane) = this.plane(mesh, f) {
+                for v in mesh.corners(f) {
+                    this.planes[v.index()].add(&plane);
+                }
+            }
+        }
+        for e in mesh.edges().filter(|&e| mesh.edge_freedom(e) != Freedom::Free) {
+            let [a, b] = mesh.ends(e);
+            let (p, q) = (mesh.point(a) - origin, mesh.point(b) - origin);
+            if let Some(direction) = (q - p).try_normalize() {
+                let line = Quadric::line(direction, p, feature_weight * sharpness(mesh, e));
+                this.lines.entry(a).or_default().add(&line);
+                this.lines.entry(b).or_default().add(&line);
+            }
+        }
+        this
+    }
+
+    fn plane(&self, mesh: &HalfedgeMesh, f: FaceId) -> Option<Quadric> {
+        let corners = mesh.corner_points(f).map(|p| p - self.origin);
+        area_vector(corners).try_normalize().map(|n| Quadric::plane(n, corners[0]))
+    }
+
+    /// The planes gathered at a vertex.
+    pub fn planes(&self, v: VertexId) -> Quadric {
+        self.planes[v.index()]
+    }
+
+    /// The lines gathered at a vertex.
+    pub fn lines(&self, v: VertexId) -> Quadric {
+        self.lines.get(&v).copied().unwrap_or_default()
+    }
+
+    /// Gives the planes and lines of a vertex that is gone to the one it became.
+    pub fn merge(&mut self, gone: VertexId, kept: VertexId) {
+        let planes = self.planes[gone.index()];
+        self.planes[kept.index()].add(&planes);
+        if let Some(lines) = self.lines.remove(&gone) {
+            self.lines.entry(kept).or_default().add(&lines);
+        }
+    }
+
+    /// Gives a new vertex the planes of the faces round it.
+    pub fn found(&mut self, mesh: &HalfedgeMesh, v: VertexId) {
+        if v.index() >= self.planes.len() {
+            self.planes.resize(v.index() + 1, Quadric::default());
+        }
+        self.planes[v.index()] = self.around(mesh, v);
+    }
+
+    /// The planes of the faces round a vertex as they are now.
+    pub fn around(&self, mesh: &HalfedgeMesh, v: VertexId) -> Quadric {
+        let mut sum = Quadric::default();
+        for f in mesh.faces_around(v) {
+            if let Some(plane) = self.plane(mesh, f) {
+                sum.add(&plane);
+            }
+        }
+        sum
+    }
+}
+
+/// Half of 1 − n·m: 0 where flat, 1 where folded; never below 0.05, so that flat marked edges hold too; 1 on rims.
+fn sharpness(mesh: &HalfedgeMesh, e: EdgeId) -> f64 {
+    let h = halfedge_of(e);
+    let normal = |side| mesh.face(side).and_then(|f| area_vector(mesh.corner_points(f)).try_normalize());
+    match (normal(h), normal(twin(h))) {
+        (Some(m), Some(n)) => (0.5 * (1.0 - m.dot(n))).max(0.05),
+        _ => 1.0,
+    }
+}
