@@ -63,7 +63,7 @@ fn a_run_writes_its_files_and_a_second_one_finds_them_right() {
     let desk = Desk::new();
     let first = desk.meshmill(&["run", "recipe.toml"]).assert().success();
     first.stdout(predicate::str::contains("written").and(predicate::str::contains("passed")));
-    assert_eq!(names(&desk.path("out/part")), ["result.stl", "result.vtu", "run.ron"]);
+    assert_eq!(names(&desk.path("out/part")), ["result.png", "result.stl", "result.vtu", "run.ron"]);
     let before = fs::metadata(desk.path("out/part/result.stl")).unwrap().modified().unwrap();
     let second = desk.meshmill(&["run", "recipe.toml"]).assert().success();
     second.stdout(predicate::str::contains("up to date").and(predicate::str::contains("done").not()));
@@ -77,9 +77,9 @@ fn a_failed_gate_exits_with_3_and_shows_the_elements() {
     let failed = desk.meshmill(&["run", "recipe.toml", "--set", "limit=0.99"]).assert().code(3);
     failed.stdout(predicate::str::contains("FAILED, 12 elements"));
     assert_eq!(names(&desk.path("out/part")), ["failed", "run.ron"]);
-    assert_eq!(names(&desk.path("out/part/failed")), ["failed.vtu", "result.stl", "result.vtu"]);
+    assert_eq!(names(&desk.path("out/part/failed")), ["failed.vtu", "result.png", "result.stl", "result.vtu"]);
     desk.meshmill(&["run", "recipe.toml"]).assert().success();
-    assert_eq!(names(&desk.path("out/part")), ["result.stl", "result.vtu", "run.ron"]);
+    assert_eq!(names(&desk.path("out/part")), ["result.png", "result.stl", "result.vtu", "run.ron"]);
 }
 
 #[test]
@@ -173,4 +173,51 @@ fn a_trace_is_a_timeline_in_json() {
     let trace: serde_json::Value = serde_json::from_slice(&fs::read(desk.path("trace.json")).unwrap()).unwrap();
     let names: Vec<_> = trace["traceEvents"].as_array().unwrap().iter().map(|event| event["name"].clone()).collect();
     assert!(names.contains(&"clean".into()), "{names:?}");
+}
+
+#[test]
+fn a_picture_stands_beside_the_outputs_and_follows_their_gate() {
+    let desk = Desk::new();
+    desk.meshmill(&["run", "recipe.toml"]).assert().success();
+    let picture = desk.path("out/part/result.png");
+    let before = (fs::read(&picture).unwrap(), fs::metadata(&picture).unwrap().modified().unwrap());
+    assert!(before.0.starts_with(b"\x89PNG"));
+    desk.meshmill(&["run", "recipe.toml"]).assert().success();
+    assert_eq!(fs::metadata(&picture).unwrap().modified().unwrap(), before.1);
+    desk.meshmill(&["run", "recipe.toml", "--set", "limit=0.99"]).assert().code(3);
+    assert!(!picture.exists() && desk.path("out/part/failed/result.png").exists());
+    desk.meshmill(&["run", "recipe.toml"]).assert().success();
+    assert_eq!(names(&desk.path("out/part")), ["result.png", "result.stl", "result.vtu", "run.ron"]);
+    assert_eq!(fs::read(&picture).unwrap(), before.0);
+}
+
+#[test]
+fn the_report_is_one_file_that_repeats_and_needs_no_network() {
+    let desk = Desk::new();
+    desk.meshmill(&["report", "recipe.toml"]).assert().code(2).stderr(predicate::str::contains("run the recipe first"));
+    desk.meshmill(&["run", "recipe.toml", "--report"]).assert().success();
+    let page = fs::read_to_string(desk.path("out/part/report.html")).unwrap();
+    desk.meshmill(&["report", "recipe.toml"]).assert().success();
+    assert_eq!(fs::read_to_string(desk.path("out/part/report.html")).unwrap(), page);
+    for part in ["<h1>part</h1>", "id=\"step-clean\"", "class=\"chart\"", "min-stretch", "[steps.raw]", "id=\"data\""] {
+        assert!(page.contains(part), "no {part}");
+    }
+    for outside in ["src=\"http", "href=\"http", "url(http", "@import"] {
+        assert!(!page.contains(outside), "{outside}");
+    }
+    desk.meshmill(&["report", "out/part", "--step", "clean", "--out", "one.html"]).assert().success();
+    assert!(fs::read_to_string(desk.path("one.html")).unwrap().contains("\"pair\":[\"clean\",\"clean\"]"));
+    let unknown = desk.meshmill(&["report", "out/part", "--step", "claen"]).assert().code(2);
+    unknown.stderr(predicate::str::contains("claen").and(predicate::str::contains("raw, clean")));
+}
+
+#[test]
+fn nothing_of_a_recipe_becomes_markup_of_its_report() {
+    let desk = Desk::new();
+    let hostile =
+        RECIPE.replace("name = \"part\"", "name = \"part\"\ndescription = \"</script><img src=x onerror=1>\"");
+    fs::write(desk.path("recipe.toml"), hostile).unwrap();
+    desk.meshmill(&["run", "recipe.toml", "--report"]).assert().success();
+    let page = fs::read_to_string(desk.path("out/part/report.html")).unwrap();
+    assert!(page.contains("&lt;img src=x onerror=1&gt;") && !page.contains("<img src=x"));
 }

@@ -61,6 +61,12 @@ impl Planned {
     }
 }
 
+/// The texts that a recipe was read from, with the names of their files.
+pub(super) fn texts(recipe: &Recipe) -> Vec<(String, String)> {
+    let files = recipe.sources.files().iter().filter(|file| !file.name.starts_with("--"));
+    files.map(|file| (file.name.clone(), file.text.clone())).collect()
+}
+
 /// The endings of files that can be written.
 pub(super) fn endings() -> Vec<&'static str> {
     Format::ALL.iter().flat_map(|format| format.endings()).copied().collect()

@@ -11,8 +11,10 @@ mod convert;
 mod exit;
 mod graph;
 mod measure;
+mod picture;
 mod plan;
 mod progress;
+mod report;
 mod run;
 mod schema;
 mod signals;
@@ -65,6 +67,7 @@ enum Command {
     Check(check::Arguments),
     Plan(plan::Arguments),
     Graph(graph::Arguments),
+    Report(report::Arguments),
     Measure(measure::Arguments),
     Convert(convert::Arguments),
     Steps(steps::Arguments),
@@ -91,6 +94,7 @@ pub fn main() -> ExitCode {
         Command::Check(command) => check::run(command),
         Command::Plan(command) => plan::run(command, global),
         Command::Graph(command) => graph::run(command),
+        Command::Report(command) => report::run(command, global),
         Command::Measure(command) => measure::run(command),
         Command::Convert(command) => convert::run(command),
         Command::Steps(command) => steps::run(command),

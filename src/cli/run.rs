@@ -6,7 +6,9 @@ use std::sync::Arc;
 use super::Global;
 use super::context::{Planned, RecipeArguments, open_store};
 use super::exit::{Exit, Fault, data, say, say_failure};
+use super::picture;
 use super::progress;
+use super::report;
 use super::signals::Interrupt;
 use super::trace::Trace;
 use crate::report::{Report, Status, record, table};
@@ -29,6 +31,9 @@ pub(super) struct Arguments {
     /// Run this step again although it is cached; a result that differs is a fault.
     #[arg(long, value_name = "STEP")]
     force: Vec<String>,
+    /// Write `report.html` into the output folder too: graph, metrics, charts and meshes in one file.
+    #[arg(long)]
+    report: bool,
     /// Print the report as one JSON document.
     #[arg(long)]
     json: bool,
@@ -56,9 +61,14 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Fault>
     if let (Some(trace), Some(path)) = (&trace, &arguments.trace) {
         trace.write(path)?;
     }
-    let report = Report::new(&planned.recipe.name, &planned.plan, &outcome);
+    let mut report = Report::new(&planned.recipe.name, &planned.plan, &outcome);
+    report::describe(&mut report, &planned.recipe);
     if !outcome.cancelled {
+        picture::write(&planned.plan, &outcome, &store)?;
         write_record(&report, &options.out)?;
+        if arguments.report {
+            report::write(&report, &store, &[], &options.out.join("report.html"))?;
+        }
     }
     tell(&report, arguments.json, global.quiet)?;
     Ok(if outcome.cancelled { interrupt.exit() } else { report.status.into() })

@@ -65,6 +65,11 @@ impl SourceMap {
         base
     }
 
+    /// All texts, in the order in which they were added.
+    pub fn files(&self) -> &[SourceFile] {
+        &self.files
+    }
+
     /// The text that a span lies in; the first one for a span that lies nowhere.
     pub fn file(&self, span: Span) -> Option<&SourceFile> {
         let index = self.files.partition_point(|file| file.base <= span.start);

@@ -4,6 +4,8 @@
 //! repeats from run to run stands apart from `timings`, which does not.
 
 pub mod measure;
+pub mod page;
+pub mod picture;
 pub mod record;
 pub mod table;
 
@@ -13,7 +15,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::metric::Measurement;
 use crate::metric::gate::GateRow;
-use crate::run::{Figures, FileState, Gate, Outcome, Plan, RunOutcome, Task, TaskId, TaskOutcome, TaskState, VERSION};
+use crate::run::{
+    Case, Figures, FileState, Gate, Outcome, Plan, RunOutcome, Task, TaskId, TaskOutcome, TaskState, VERSION,
+};
 use crate::step::StepFailure;
 
 /// How a run ended.
@@ -35,12 +39,18 @@ pub enum Status {
 }
 
 /// A run, for people and programs.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Report {
     /// Version of the program.
     pub meshmill: String,
     /// Name of the recipe.
     pub recipe: String,
+    /// What the recipe is for.
+    #[serde(default)]
+    pub description: String,
+    /// The texts of the recipe, with the names of their files: its own, and those that it extends.
+    #[serde(default)]
+    pub texts: Vec<(String, String)>,
     /// How the run ended.
     pub status: Status,
     /// The cases, one for a plain run.
@@ -52,7 +62,7 @@ pub struct Report {
 }
 
 /// One case of a run.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CaseReport {
     /// Its name; empty for a plain run.
     pub name: String,
@@ -67,12 +77,15 @@ pub struct CaseReport {
 }
 
 /// One step of a case.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StepReport {
     /// Its name in the recipe, with `.OUTPUT` for a further output.
     pub name: String,
     /// The kind of step.
     pub kind: String,
+    /// Its inputs by name: a step of the case, or the path of a file.
+    #[serde(default)]
+    pub inputs: BTreeMap<String, String>,
     /// Its key in the cache, where it became known.
     pub key: Option<String>,
     /// The hash of its result.
@@ -88,10 +101,13 @@ pub struct StepReport {
 }
 
 /// The checks of one step.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GateSection {
     /// The step as the recipe names it.
     pub step: String,
+    /// The steps that its mesh is compared with.
+    #[serde(default)]
+    pub references: Vec<String>,
     /// Whether all checks hold; absent where they could not be decided.
     pub passed: Option<bool>,
     /// The checks.
@@ -101,7 +117,7 @@ pub struct GateSection {
 }
 
 /// An output file.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FileReport {
     /// Where it is.
     pub path: String,
@@ -116,7 +132,7 @@ pub struct FileReport {
 }
 
 /// What differs from run to run.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Timings {
     /// Seconds of the run.
     pub total: f64,
@@ -151,8 +167,16 @@ impl Report {
             timings.files.insert(file.path.display().to_string(), file.state);
         }
         let cases = (0..plan.cases().len()).map(|case| CaseReport::new(plan, outcome, case)).collect();
-        let recipe = recipe.to_owned();
-        Self { meshmill: VERSION.to_owned(), recipe, status: status(outcome), cases, inputs, timings }
+        Self {
+            meshmill: VERSION.to_owned(),
+            recipe: recipe.to_owned(),
+            description: String::new(),
+            texts: Vec::new(),
+            status: status(outcome),
+            cases,
+            inputs,
+            timings,
+        }
     }
 
     /// All failures of a run, with the name of what failed.
@@ -198,9 +222,10 @@ fn status(outcome: &RunOutcome) -> Status {
 impl CaseReport {
     fn new(plan: &Plan, outcome: &RunOutcome, number: usize) -> Self {
         let case = &plan.cases()[number];
+        let names = Names::new(plan, case);
         let mut steps: Vec<(TaskId, &String)> = case.steps.iter().map(|(name, task)| (*task, name)).collect();
         steps.sort_unstable();
-        let gates = case.gates.iter().map(|gate| gate_section(gate, outcome)).collect();
+        let gates = case.gates.iter().map(|gate| gate_section(&names, gate, outcome)).collect();
         let files = outcome.files.iter().filter(|file| file.case == number);
         let files = files.map(|file| FileReport {
             path: file.path.display().to_string(),
@@ -212,7 +237,7 @@ impl CaseReport {
         Self {
             name: case.name.clone(),
             params: case.params.clone(),
-            steps: steps.into_iter().filter_map(|(id, name)| step_report(plan, outcome, id, name)).collect(),
+            steps: steps.into_iter().filter_map(|(id, name)| step_report(&names, outcome, (id, name))).collect(),
             gates,
             files: files.collect(),
         }
@@ -227,9 +252,36 @@ impl CaseReport {
     }
 }
 
-fn gate_section(gate: &Gate, outcome: &RunOutcome) -> GateSection {
-    let mut section =
-        GateSection { step: gate.step.clone(), passed: Some(true), rows: Vec::new(), failures: Vec::new() };
+/// What tasks are called in a case: by the first of their names, a file by its path.
+struct Names<'a> {
+    plan: &'a Plan,
+    steps: BTreeMap<TaskId, &'a str>,
+}
+
+impl<'a> Names<'a> {
+    fn new(plan: &'a Plan, case: &'a Case) -> Self {
+        // In reverse, so that the first name stays.
+        let steps = case.steps.iter().rev().map(|(name, task)| (*task, name.as_str())).collect();
+        Self { plan, steps }
+    }
+
+    fn of(&self, id: TaskId) -> String {
+        match (&self.plan.node(id).task, self.steps.get(&id)) {
+            (Task::Source(source), _) => source.path.display().to_string(),
+            (Task::Step(_) | Task::Gate(_), Some(name)) => (*name).to_owned(),
+            (Task::Step(_) | Task::Gate(_), None) => self.plan.node(id).label.clone(),
+        }
+    }
+}
+
+fn gate_section(names: &Names<'_>, gate: &Gate, outcome: &RunOutcome) -> GateSection {
+    let inputs = gate.tasks.iter().flat_map(|task| names.plan.inputs(*task));
+    let mut references: Vec<String> =
+        inputs.filter(|(name, _)| *name == "reference").map(|(_, task)| names.of(task)).collect();
+    references.sort_unstable();
+    references.dedup();
+    let (rows, failures) = (Vec::new(), Vec::new());
+    let mut section = GateSection { step: gate.step.clone(), references, passed: Some(true), rows, failures };
     for task in gate.tasks.iter().map(|task| outcome.task(*task)) {
         match task.gate_report() {
             Some(report) => {
@@ -243,8 +295,8 @@ fn gate_section(gate: &Gate, outcome: &RunOutcome) -> GateSection {
     section
 }
 
-fn step_report(plan: &Plan, outcome: &RunOutcome, id: TaskId, name: &str) -> Option<StepReport> {
-    let Task::Step(step) = &plan.node(id).task else { return None };
+fn step_report(names: &Names<'_>, outcome: &RunOutcome, (id, name): (TaskId, &str)) -> Option<StepReport> {
+    let Task::Step(step) = &names.plan.node(id).task else { return None };
     let task = outcome.task(id);
     let figures = task.entry.as_ref().and_then(|entry| match &entry.outcome {
         Outcome::Artifact { figures, .. } => Some(figures.clone()),
@@ -253,6 +305,7 @@ fn step_report(plan: &Plan, outcome: &RunOutcome, id: TaskId, name: &str) -> Opt
     Some(StepReport {
         name: name.to_owned(),
         kind: step.def.name.to_owned(),
+        inputs: names.plan.inputs(id).into_iter().map(|(input, task)| (input.to_owned(), names.of(task))).collect(),
         key: task.key.map(|key| key.to_hex().to_string()),
         content: task.content.map(|content| content.to_hex().to_string()),
         figures,

@@ -6,10 +6,11 @@ use super::observe::{Event, Observer};
 use crate::store::Entry;
 
 /// Where a node is on its way.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum TaskState {
     /// Its inputs are not known yet.
+    #[default]
     Unknown,
     /// Nobody asked for it.
     Unwanted,

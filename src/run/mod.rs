@@ -42,7 +42,7 @@ pub use schedule::run;
 pub use shared::{VERSION, recipe_task};
 
 // An outcome speaks of these, so whoever reads outcomes finds them here.
-pub use crate::plan::{Gate, Plan, Task, TaskId};
+pub use crate::plan::{Case, Gate, Plan, Task, TaskId};
 pub use crate::store::{Entry, Figures, Outcome, StoreError};
 
 /// What the caller decides about a run.

@@ -40,7 +40,7 @@ impl TaskOutcome {
 }
 
 /// What became of an output file.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum FileState {
     /// It was right already.

@@ -2,6 +2,7 @@
 
 pub mod collapse;
 pub mod curvature;
+pub mod decimate;
 pub mod defeature;
 pub mod eigen;
 pub mod feature;
