@@ -10,8 +10,8 @@ use std::fmt::Write;
 
 use super::text::escape;
 
-const NODE: [f64; 2] = [124.0, 46.0];
-const GAP: [f64; 2] = [34.0, 18.0];
+const NODE: [f64; 2] = [128.0, 46.0];
+const GAP: [f64; 2] = [29.0, 18.0];
 /// Height that a passing edge takes.
 const LANE: f64 = 8.0;
 /// Rounds of ordering; more change nothing on graphs of this kind.
@@ -24,7 +24,7 @@ pub(super) struct GraphNode {
     pub(super) name: String,
     /// The second line.
     pub(super) kind: String,
-    /// State or time, at the right of the second line.
+    /// State or time, at the right of the first line.
     pub(super) note: String,
     /// CSS classes: what it is and its state.
     pub(super) class: String,
@@ -100,12 +100,12 @@ fn draw_node(text: &mut String, node: &GraphNode, x: f64, y: f64) {
         height - 14.0,
         x + 12.0,
         top + 19.0,
-        fit(&node.name, 16),
+        fit(&node.name, if node.note.is_empty() { 15 } else { 14_usize.saturating_sub(node.note.chars().count() / 2) }),
         x + 12.0,
         top + 36.0,
-        fit(&node.kind, if node.note.is_empty() { 19 } else { 13 }),
+        fit(&node.kind, 19),
         x + width - 8.0,
-        top + 36.0,
+        top + 19.0,
         escape(&node.note)
     );
 }

@@ -15,8 +15,8 @@ use super::{Library, MOST_BYTES, MOST_FACES};
 use crate::mesh::geometry::triangle_angles;
 use crate::mesh::{Facet, Soup, Surface};
 use crate::metric::{self, Measurement, quad_shape::quad_shape};
+use crate::report::CaseReport;
 use crate::report::picture::{self, ramp};
-use crate::report::{CaseReport, StepReport};
 use crate::run::VERSION;
 use crate::step::Artifact;
 use crate::watch::Watch;
@@ -53,6 +53,7 @@ pub(super) struct Gathered {
 #[derive(Clone, Debug)]
 pub(super) struct Known {
     pub(super) content: String,
+    pub(super) faces: usize,
     pub(super) shapes: Shapes,
     pub(super) worst: Vec<Worst>,
     pub(super) measurement: Measurement,
@@ -87,7 +88,7 @@ pub(super) fn gather(case: &CaseReport, outline: &Outline, library: &dyn Library
     for step in case.steps.iter().filter(|step| has_mesh(step)) {
         let Some(content) = &step.content else { continue };
         if !known.contains_key(content)
-            && let Some(found) = find_out(step, content, library, reference.as_ref())
+            && let Some(found) = find_out(&step.name, content, library, reference.as_ref())
         {
             known.insert(content.clone(), Arc::new(found));
         }
@@ -95,6 +96,7 @@ pub(super) fn gather(case: &CaseReport, outline: &Outline, library: &dyn Library
             gathered.meshes.insert(step.name.clone(), Arc::clone(found));
         }
     }
+    limit = first_limit(&gathered, outline);
     while pack(&mut gathered, outline, library, reference.as_ref(), limit) > MOST_BYTES && limit > 1000 {
         limit /= 2;
     }
@@ -108,7 +110,24 @@ fn open_reference(case: &CaseReport, outline: &Outline, library: &dyn Library) -
     Some(Reference { step: name.clone(), content, tree })
 }
 
-fn find_out(step: &StepReport, content: &str, library: &dyn Library, reference: Option<&Reference>) -> Option<Known> {
+/// A limit that leaves about enough room, so that meshes need not be packed twice as a rule.
+fn first_limit(gathered: &Gathered, outline: &Outline) -> usize {
+    /// Characters that a face takes with its colours, from experience.
+    const BYTES_A_FACE: usize = 14;
+    let faces: BTreeMap<&str, usize> = outline
+        .shown
+        .iter()
+        .filter_map(|name| gathered.meshes.get(name))
+        .map(|known| (known.content.as_str(), known.faces))
+        .collect();
+    let mut limit = MOST_FACES;
+    while limit > 1000 && faces.values().map(|faces| BYTES_A_FACE * faces.min(&limit)).sum::<usize>() > MOST_BYTES {
+        limit -= limit / 8;
+    }
+    limit
+}
+
+fn find_out(name: &str, content: &str, library: &dyn Library, reference: Option<&Reference>) -> Option<Known> {
     let mesh = open(library, content)?;
     let of_reference = reference.map(|reference| reference.content.as_str()).filter(|other| *other != content);
     let against = || of_reference.and_then(|other| open(library, other));
@@ -117,9 +136,10 @@ fn find_out(step: &StepReport, content: &str, library: &dyn Library, reference: 
         metric::measure(&mesh.soup, against.as_ref().map(|mesh| &*mesh.soup), &Watch::default()).ok()
     };
     let measurement = library.measurement(content, of_reference, &mut measure).unwrap_or_default();
-    let note = format!("meshmill {VERSION}, {}", step.name);
+    let note = format!("meshmill {VERSION}, {name}");
     Some(Known {
         content: content.to_owned(),
+        faces: mesh.soup.faces.len(),
         shapes: shapes(&mesh.soup),
         worst: worst(&mesh.soup, &columns(&mesh.soup, None, reference)),
         measurement,

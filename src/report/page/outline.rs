@@ -38,7 +38,9 @@ impl Outline {
         let result = result(case, &all);
         let first = wanted.first().or(reference.as_ref()).or(shown.first()).cloned().unwrap_or_default();
         let second = wanted.get(1).or(result.as_ref().filter(|_| wanted.is_empty())).or(shown.last()).cloned();
-        let pair = [first, second.unwrap_or_default()];
+        let second = second.unwrap_or_default();
+        let other = shown.iter().find(|name| **name != second).filter(|_| first == second && wanted.len() < 2);
+        let pair = [other.cloned().unwrap_or(first), second];
         Ok(Self { pair, shown, reference, result, previous: previous(case, &all) })
     }
 }

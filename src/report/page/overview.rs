@@ -220,7 +220,7 @@ fn files_by_step(case: &CaseReport) -> Vec<(&str, Vec<String>)> {
     steps
 }
 
-fn file_name(path: &str) -> &str {
+pub(super) fn file_name(path: &str) -> &str {
     path.rsplit(['/', '\\']).next().unwrap_or(path)
 }
 

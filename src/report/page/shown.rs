@@ -66,7 +66,8 @@ pub(super) fn shown(mesh: &Soup, surface: Option<&Surface>, reference: Option<&R
         lines: lines(mesh),
         totals: [mesh.points.len(), mesh.faces.len()],
     };
-    if mesh.faces.len() > limit { reduce(mesh, &whole, limit) } else { whole }
+    // A tenth more is not worth another mesh than the one that was computed.
+    if mesh.faces.len() > limit + limit / 10 { reduce(mesh, &whole, limit) } else { whole }
 }
 
 /// Collapses edges until few enough triangles are left. Each shows the worst of those that it stands for.

@@ -10,7 +10,7 @@ use super::Library;
 use super::chart::{Histogram, histogram};
 use super::meshes::{Gathered, Known, Shapes};
 use super::outline::Outline;
-use super::overview::{FaultView, is_better, sentence};
+use super::overview::{FaultView, file_name, is_better, sentence};
 use super::text::{anchor, digits, seconds, unit, value};
 use super::worst::{Element, Worst};
 use crate::metric::registry::{METRICS, MetricDef};
@@ -111,7 +111,8 @@ fn step_view(
 ) -> StepView {
     let (state, time) = report.timings.tasks.get(&in_case(&case.name, &step.name)).copied().unwrap_or_default();
     let known = gathered.meshes.get(&step.name).map(|known| &**known);
-    let previous = outline.previous.get(&step.name);
+    // A table of metrics is that of the mesh before, so there is nothing to set beside it.
+    let previous = outline.previous.get(&step.name).filter(|_| known.is_some());
     let before = previous.and_then(|name| Some((name.as_str(), &**gathered.meshes.get(name)?)));
     let class = match state {
         TaskState::Done => "done",
@@ -130,7 +131,7 @@ fn step_view(
         port: step.figures.as_ref().map(|figures| figures.port.clone()).unwrap_or_default(),
         key: step.key.clone().unwrap_or_default(),
         content: step.content.clone().unwrap_or_default(),
-        inputs: step.inputs.iter().map(|(input, from)| (input.clone(), from.clone())).collect(),
+        inputs: step.inputs.iter().map(|(input, from)| (input.clone(), file_name(from).to_owned())).collect(),
         parameters: step.key.as_ref().map(|key| library.parameters(key)).unwrap_or_default(),
         statistics: step.stats.as_ref().map(flat).unwrap_or_default(),
         failure: step.failure.as_ref().map(|failure| Failure {

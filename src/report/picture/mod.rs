@@ -27,7 +27,7 @@ use paint::{Canvas, Patch};
 /// Samples a pixel and axis.
 const SAMPLES: usize = 2;
 /// Element edges that are shorter than this many pixels on average are not drawn.
-const LEAST_EDGE: f64 = 4.0;
+const LEAST_EDGE: f64 = 6.0;
 
 /// Draws a mesh as a PNG file of this size with a transparent ground. `note` is stored in the file as a text.
 ///

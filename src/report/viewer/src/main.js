@@ -87,7 +87,7 @@ class Viewer {
   }
 
   redraw() {
-    if (this.waiting) return;
+    if (this.waiting || this.holding) return;
     this.waiting = requestAnimationFrame(() => {
       this.waiting = null;
       this.panes.forEach((pane, side) => pane.draw(this.views[side], this.size));
@@ -132,23 +132,37 @@ class Viewer {
 
   /** Shows a mesh in a pane. */
   async show(side, name) {
+    if (await this.place(side, name)) await this.refresh();
+  }
+
+  /** Puts a mesh into a pane; false when another one was chosen meanwhile. */
+  async place(side, name) {
     this.names[side] = name;
     const select = $(`mesh-${side}`);
     select.value = name;
     const { totals, shown } = this.entry(name);
     const count = (number) => number.toLocaleString("en").replaceAll(",", "\u2009");
     const all = `${count(totals[1])} faces, ${count(totals[0])} vertices`;
-    $(`count-${side}`).textContent = shown[1] < totals[1] ? `${all}; shown with ${count(shown[1])} faces, each as the worst it stands for` : all;
+    $(`count-${side}`).textContent = shown[1] < totals[1] ? `${all}; shown thinned to ${count(shown[1])} faces, each coloured by the worst it stands for` : all;
     const model = await this.model(name);
-    if (this.names[side] !== name) return;
+    if (this.names[side] !== name) return false;
     this.panes[side].show(model);
+    return true;
+  }
+
+  /** Brings colours and lines in line with the meshes that are shown. */
+  async refresh() {
     this.choices();
     await this.colour();
-    this.lineBoxes();
+    await this.lineBoxes();
   }
 
   async start() {
-    await Promise.all([0, 1].map((side) => this.show(side, this.names[side])));
+    // Nothing is drawn before everything is there: without a graphics card a picture costs more than all the rest.
+    this.holding = true;
+    await Promise.all([0, 1].map((side) => this.place(side, this.names[side])));
+    await this.refresh();
+    this.holding = false;
     this.fit(0, false);
     $("viewer").dataset.ready = "true";
   }
@@ -205,7 +219,7 @@ class Viewer {
       label.append(box, swatch, title);
       return label;
     }));
-    this.style();
+    return this.style();
   }
 
   async style() {
