@@ -45,6 +45,13 @@ const CASES: &[(&str, &str, &str)] = &[
     ("adapt-curvature", "smallest = \"3%\"", ""),
     ("adapt-region", "size = \"8%\", half-spaces = [{ point = [0, 0, 0], normal = [1, 2, 3] }]", ""),
     ("adapt-density", "base = \"60%\", share = \"40%\"", ""),
+    ("partition", "", ""),
+    ("partition", "regions = 5, metric = \"l2\", seed = 3", ""),
+    ("partition", "max-angle = 60, disk = true, mark-borders = true", ""),
+    ("straighten", "", ""),
+    ("straighten", "method = \"flip-geodesic\", rounds = 3", ""),
+    ("split", "", ""),
+    ("split", "snap = 0, flips = false", ""),
     ("measure", "", ""),
 ];
 
@@ -75,6 +82,10 @@ fn inputs() -> Vec<(&'static str, Artifact)> {
         let top = run("select", "name = \"top\", normal = { direction = [0, 0, 1], angle = 40 }", &plain).artifact;
         run("features", "angle = 35", &top).artifact
     };
+    let curves = |mesh: &meshmill::mesh::Soup| {
+        let parts = run("partition", "regions = 7", &named(mesh)).artifact;
+        run("straighten", "", &parts).artifact
+    };
     let broken = shapes::duplicate_face(shapes::flipped_face(shapes::hole(shapes::sphere(1), 9), 3), 4);
     let mut inputs: Vec<_> = shapes::STANDARD.iter().map(|(name, shape)| (*name, step::soup(shape()))).collect();
     inputs.extend([
@@ -83,6 +94,7 @@ fn inputs() -> Vec<(&'static str, Artifact)> {
         ("named-cylinder", named(&shapes::cylinder(20, 3))),
         ("named-washer", named(&shapes::washer(20))),
         ("named-grid", named(&shapes::grid(7))),
+        ("curves-on-a-sphere", curves(&shapes::sphere(3))),
         ("levels-of-a-sphere", levels::levels(&shapes::sphere(3))),
     ]);
     inputs

@@ -19,11 +19,14 @@ mod steps {
     mod golden;
     mod improve_quality;
     mod measure;
+    mod partition;
     mod read;
     mod refine;
     mod remove_features;
     mod repair;
     mod resolution;
     mod select;
+    mod split;
+    mod straighten;
     mod subdivide;
 }

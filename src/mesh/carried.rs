@@ -1,4 +1,4 @@
-//! What a mesh carries besides points and faces: groups, regions, freedom, seams and fields.
+//! What a mesh carries besides points and faces: groups, regions, freedom, seams, fields and curves.
 //!
 //! All members are stored sorted and without repeats, so that equal content is equal bytes.
 
@@ -122,6 +122,40 @@ pub struct Field {
     pub values: Vec<f64>,
 }
 
+/// A place on the surface: on a vertex, or inside an edge.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum SurfacePoint {
+    /// On a vertex.
+    Vertex(VertexId),
+    /// Inside an edge.
+    Edge {
+        /// The edge.
+        edge: EdgeKey,
+        /// Where: above 0 at the first end, below 1 at the second.
+        t: f64,
+    },
+}
+
+/// A polyline on the surface. Neighbouring points lie in one face, corners and sides counted in.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Curve {
+    /// The points in order; the first is not repeated at the end of a closed curve.
+    pub points: Vec<SurfacePoint>,
+    /// Whether the last point joins the first.
+    pub is_closed: bool,
+    /// The regions on the left and on the right, looking along the curve from outside.
+    pub sides: [u32; 2],
+}
+
+impl Curve {
+    /// The segments in order.
+    pub fn segments(&self) -> impl Iterator<Item = [SurfacePoint; 2]> + '_ {
+        let closing = if self.is_closed { self.points.last().zip(self.points.first()) } else { None };
+        self.points.windows(2).map(|pair| [pair[0], pair[1]]).chain(closing.map(|(&last, &first)| [last, first]))
+    }
+}
+
 /// Everything a mesh carries.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Carried {
@@ -137,6 +171,8 @@ pub struct Carried {
     pub seams: BTreeMap<VertexId, SeamId>,
     /// Fields, sorted by support and name.
     pub fields: Vec<Field>,
+    /// Curves on the surface; whoever changes faces or vertices drops them.
+    pub curves: Vec<Curve>,
 }
 
 impl Carried {

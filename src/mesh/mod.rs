@@ -17,7 +17,10 @@ pub mod topology;
 pub mod transfer;
 pub mod validate;
 
-pub use carried::{Carried, EdgeKey, EdgeMark, Field, Freedom, Groups, MarkCause, Regions, SeamId, Support, edge_key};
+pub use carried::{
+    Carried, Curve, EdgeKey, EdgeMark, Field, Freedom, Groups, MarkCause, Regions, SeamId, Support, SurfacePoint,
+    edge_key,
+};
 pub use freedom::{FreedomError, LockRules, ResolvedFreedom, Rim, resolve_freedom};
 pub use halfedge::HalfedgeMesh;
 pub use hierarchy::Hierarchy;

@@ -150,6 +150,22 @@ pub enum Defect {
         /// The vertex.
         vertex: VertexId,
     },
+    /// A point of a curve on what is no vertex or edge of the mesh, or at no place inside its edge.
+    #[error("point {point} of curve {curve} lies on no vertex and inside no edge")]
+    CurveOffTheSurface {
+        /// The curve's number.
+        curve: usize,
+        /// The point's number.
+        point: usize,
+    },
+    /// Neighbouring points of a curve that share no face.
+    #[error("curve {curve} leaves the surface between its points {point} and the next")]
+    CurveLeavesTheSurface {
+        /// The curve's number.
+        curve: usize,
+        /// The number of the point before.
+        point: usize,
+    },
     /// A seam id that only one vertex has, or that a missing vertex has.
     #[error("vertex {vertex} has the seam id {}, which no other vertex has", seam.0)]
     SeamWithoutPartner {

@@ -7,12 +7,15 @@ pub mod control_properties;
 pub mod features;
 pub mod improve_quality;
 pub mod measure;
+pub mod partition;
 pub mod read;
 pub mod refine;
 pub mod remove_features;
 pub mod repair;
 pub mod resolution;
 pub mod select;
+pub mod split;
+pub mod straighten;
 pub mod subdivide;
 
 use crate::step::StepDef;
@@ -32,5 +35,8 @@ pub static CATALOG: &[StepDef] = &[
     StepDef::of::<adapt_curvature::Step>(),
     StepDef::of::<adapt_region::Step>(),
     StepDef::of::<adapt_density::Step>(),
+    StepDef::of::<partition::Step>(),
+    StepDef::of::<straighten::Step>(),
+    StepDef::of::<split::Step>(),
     StepDef::of::<measure::Step>(),
 ];

@@ -19,10 +19,11 @@ use crate::metric::Measurement;
 use crate::step::{Artifact, FileBytes, Port};
 
 mod cover;
+mod curves;
 mod forest;
 
 /// Raised whenever the canonical bytes of equal artifacts change; part of every key.
-pub const CODEC_VERSION: u16 = 1;
+pub const CODEC_VERSION: u16 = 2;
 
 const MAGIC: [u8; 4] = *b"mmca";
 
@@ -212,7 +213,7 @@ fn mixed<K>(arity: &[u8], corners: &[VertexId]) -> Result<IdVec<K, Facet>, Codec
 }
 
 fn encode_carried(writer: &mut ColumnWriter, carried: &Carried) {
-    let Carried { groups, regions, marks, pins, seams, fields } = carried;
+    let Carried { groups, regions, marks, pins, seams, fields, curves: on_surface } = carried;
     encode_groups(writer, groups);
     writer.number(u64::from(regions.is_some()));
     if let Some(Regions { labels, names }) = regions {
@@ -235,6 +236,7 @@ fn encode_carried(writer: &mut ColumnWriter, carried: &Carried) {
         writer.number(*components as u64);
         writer.f64s(values.iter().copied());
     }
+    curves::encode(writer, on_surface);
 }
 
 fn decode_carried(reader: &mut ColumnReader<'_>) -> Result<Carried, CodecError> {
@@ -261,7 +263,8 @@ fn decode_carried(reader: &mut ColumnReader<'_>) -> Result<Carried, CodecError> 
         let components = usize::try_from(reader.number()?).map_err(|_| CodecError::Truncated)?;
         fields.push(Field { name, support, components, values: reader.f64s()?.collect() });
     }
-    Ok(Carried { groups, regions, marks, pins, seams, fields })
+    let curves = curves::decode(reader)?;
+    Ok(Carried { groups, regions, marks, pins, seams, fields, curves })
 }
 
 fn encode_groups(writer: &mut ColumnWriter, groups: &Groups) {

@@ -1,5 +1,6 @@
 //! What several steps share: algorithms on surfaces that are no step of their own.
 
+pub mod arcs;
 pub mod collapse;
 pub mod curvature;
 pub mod decimate;
@@ -13,4 +14,7 @@ pub mod levels;
 pub mod quadric;
 pub mod refine;
 pub mod remesh;
+pub mod split_curves;
+pub mod surface_curve;
 pub mod triangulate_loop;
+pub mod vsa;

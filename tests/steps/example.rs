@@ -18,6 +18,8 @@ const BEFORE: &str = "[inputs]\npart = \"part.obj\"\n\
     [steps.raw]\nuse = \"read\"\nfile = \"=inputs.part\"\n\
     [steps.clean]\nuse = \"repair\"\nfrom = \"raw\"\n\
     [steps.marked]\nuse = \"features\"\nfrom = \"clean\"\n\
+    [steps.parts]\nuse = \"partition\"\nfrom = \"marked\"\nregions = 16\n\
+    [steps.curves]\nuse = \"straighten\"\nfrom = \"parts\"\n\
     [steps.fe]\nuse = \"control-properties\"\nfrom = \"clean\"\n";
 
 /// A slender bar as an OBJ file: small steps in percent of its diagonal stay few.

@@ -1,11 +1,11 @@
-//! Defects of groups, regions, fields, marks, pins and seams.
+//! Defects of groups, regions, fields, marks, pins, seams and curves.
 
 use std::collections::BTreeMap;
 
 use super::{Defect, GroupKind};
-use crate::mesh::carried::{Carried, Groups, Support};
+use crate::mesh::carried::{Carried, Groups, Support, SurfacePoint};
 use crate::mesh::id::FaceId;
-use crate::mesh::topology::{EdgeTable, Faces};
+use crate::mesh::topology::{EdgeTable, Faces, VertexFaces};
 
 /// Without `edges`, because corners are out of range, marks and edge groups are not looked up.
 pub(super) fn validate(carried: &Carried, mesh: &impl Faces, edges: Option<&EdgeTable>, defects: &mut Vec<Defect>) {
@@ -16,6 +16,9 @@ pub(super) fn validate(carried: &Carried, mesh: &impl Faces, edges: Option<&Edge
         let lost = carried.marks.keys().filter(|key| edges.find(**key).is_none());
         defects.extend(lost.map(|&ends| Defect::MarkWithoutEdge { ends }));
     }
+    if let Some(edges) = edges {
+        curves(carried, mesh, edges, defects);
+    }
     let missing = carried.pins.keys().filter(|v| v.index() >= mesh.vertex_count());
     defects.extend(missing.map(|&vertex| Defect::PinWithoutVertex { vertex }));
     let mut partners = BTreeMap::new();
@@ -25,6 +28,33 @@ pub(super) fn validate(carried: &Carried, mesh: &impl Faces, edges: Option<&Edge
     let alone = |(v, seam): &(&_, &_)| partners.get(*seam).is_none_or(|p: &Vec<_>| p.len() < 2 || !p.contains(*v));
     let lonely = carried.seams.iter().filter(alone);
     defects.extend(lonely.map(|(&vertex, &seam)| Defect::SeamWithoutPartner { vertex, seam }));
+}
+
+fn curves(carried: &Carried, mesh: &impl Faces, edges: &EdgeTable, defects: &mut Vec<Defect>) {
+    if carried.curves.is_empty() {
+        return;
+    }
+    let at = VertexFaces::new(mesh);
+    let faces = |point: &SurfacePoint| match *point {
+        SurfacePoint::Vertex(v) if v.index() < mesh.vertex_count() => Some(at.of(v).to_vec()),
+        SurfacePoint::Edge { edge, t } if t > 0.0 && t < 1.0 => {
+            edges.find(edge).map(|e| edges.sides(e).iter().map(|side| side.face).collect())
+        }
+        SurfacePoint::Vertex(_) | SurfacePoint::Edge { .. } => None,
+    };
+    for (curve, polyline) in carried.curves.iter().enumerate() {
+        let of: Vec<Option<Vec<FaceId>>> = polyline.points.iter().map(faces).collect();
+        for (point, here) in of.iter().enumerate() {
+            let next = if point + 1 < of.len() { of.get(point + 1) } else { of.first().filter(|_| polyline.is_closed) };
+            match (here, next) {
+                (None, _) => defects.push(Defect::CurveOffTheSurface { curve, point }),
+                (Some(here), Some(Some(next))) if !here.iter().any(|f| next.contains(f)) => {
+                    defects.push(Defect::CurveLeavesTheSurface { curve, point });
+                }
+                _ => {}
+            }
+        }
+    }
 }
 
 fn groups(groups: &Groups, mesh: &impl Faces, edges: Option<&EdgeTable>, defects: &mut Vec<Defect>) {

@@ -4,7 +4,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::mesh::hierarchy::{Hierarchy, NodeId};
-use crate::mesh::{Cover, edge_key};
+use crate::mesh::{Cover, Curve, SurfacePoint, edge_key};
 
 fn id<K>(raw: u32) -> Id<K> {
     Id::from_raw(raw)
@@ -25,6 +25,11 @@ fn carried() -> Carried {
         components: 1,
         values: vec![f64::NAN, -0.0, 1.0, 2.0],
     });
+    let inside = SurfacePoint::Edge { edge: edge_key(id(0), id(1)), t: 0.25 };
+    let open = Curve { points: vec![SurfacePoint::Vertex(id(2)), inside], is_closed: false, sides: [1, 0] };
+    let closed =
+        Curve { points: [0, 1, 2].map(|v| SurfacePoint::Vertex(id(v))).to_vec(), is_closed: true, sides: [0, 1] };
+    carried.curves = vec![open, closed];
     carried
 }
 
@@ -140,6 +145,7 @@ fn what_a_surface_carries_comes_back() {
     assert_eq!(back.carried.regions, expected.regions);
     assert_eq!((&back.carried.marks, &back.carried.pins), (&expected.marks, &expected.pins));
     assert_eq!(back.carried.seams, expected.seams);
+    assert_eq!(back.carried.curves, expected.curves);
     assert_eq!(back.carried.fields[0].values[1].to_bits(), (-0.0_f64).to_bits());
 }
 
@@ -170,6 +176,18 @@ fn a_corner_beyond_the_points_is_refused() {
     let bad =
         Artifact::Surface(Arc::new(Surface { points: points(), faces: faces.into(), carried: Carried::default() }));
     assert!(matches!(decode(&encode(&bad)), Err(CodecError::Malformed(_))));
+}
+
+#[test]
+fn a_curve_off_the_surface_is_refused() {
+    let at = |edge: [u32; 2], t| vec![SurfacePoint::Edge { edge: edge.map(id), t }];
+    let wrongs = [at([0, 1], 0.0), at([0, 1], 1.0), at([0, 1], f64::NAN), at([1, 0], 0.5), at([1, 1], 0.5)];
+    for (place, points) in wrongs.into_iter().enumerate() {
+        let Artifact::Surface(good) = surface() else { unreachable!("made just here") };
+        let mut bad = (*good).clone();
+        bad.carried.curves = vec![Curve { points, is_closed: false, sides: [0, 1] }];
+        assert!(decode(&encode(&Artifact::Surface(Arc::new(bad)))).is_err(), "{place}");
+    }
 }
 
 #[test]

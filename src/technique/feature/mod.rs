@@ -27,6 +27,8 @@ mod sharpness;
 mod tests;
 mod voting;
 
+pub use sharpness::normals as reliable_normals;
+
 use std::collections::BTreeSet;
 
 use crate::mesh::id::Edge;

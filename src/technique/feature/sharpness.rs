@@ -21,7 +21,7 @@ pub(super) fn angles(edges: &EdgeTable, normals: &IdVec<Face, DVec3>) -> IdVec<E
 }
 
 /// The normals of the faces; a face without a reliable one takes that of its neighbour over its longest side.
-pub(super) fn normals(surface: &Surface, edges: &EdgeTable) -> IdVec<Face, DVec3> {
+pub fn normals(surface: &Surface, edges: &EdgeTable) -> IdVec<Face, DVec3> {
     let least = LEAST_HEIGHT * Aabb::of(surface.points.iter().copied()).diagonal();
     let own = |f: FaceId| {
         let corners = surface.corners(f);
