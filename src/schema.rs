@@ -5,6 +5,7 @@
 //! extended recipe, and which one only the loader knows.
 
 mod reference;
+mod sweep;
 
 use std::collections::BTreeSet;
 
@@ -83,20 +84,7 @@ pub fn recipe_schema(catalog: &[StepDef], endings: &[&str]) -> Value {
                     ]
                 }
             },
-            "sweep": {
-                "type": "object",
-                "description": "A parameter study, read by `meshmill sweep` only.",
-                "properties": {
-                    "axes": {
-                        "type": "object",
-                        "description": "By parameter, the values it takes.",
-                        "additionalProperties": {
-                            "type": "array",
-                            "items": { "$ref": "#/definitions/Scalar" }
-                        }
-                    }
-                }
-            }
+            "sweep": sweep::sweep()
         },
         "definitions": definitions
     })

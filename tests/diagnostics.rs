@@ -70,6 +70,7 @@ fn the_command_line_is_explained_too() {
     let overrides = Overrides {
         set: vec![("sise".to_owned(), "3%".to_owned()), ("size".to_owned(), "=1 + ".to_owned())],
         inputs: vec![("part".to_owned(), "nowhere.stl".into())],
+        ..Overrides::default()
     };
     insta::with_settings!({ snapshot_path => "snapshots/diagnostics", prepend_module_to_snapshot => false, omit_expression => true }, {
         insta::assert_snapshot!("command-line", report("tests/recipes/good.toml", &overrides));

@@ -9,7 +9,7 @@ use etcetera::BaseStrategy;
 use super::Global;
 use super::exit::{Exit, Fault};
 use crate::format::Format;
-use crate::plan::{self, Context, Plan};
+use crate::plan::{self, CaseSpec, ColumnRequest, Context, Plan};
 use crate::recipe::{Overrides, Recipe, suggest};
 use crate::steps::CATALOG;
 use crate::store::Store;
@@ -36,18 +36,59 @@ pub(super) struct Planned {
 impl RecipeArguments {
     /// Loads and plans the recipe; all that is wrong with it is one fault.
     pub(super) fn plan(&self) -> Result<Planned, Fault> {
+        let recipe = self.load(&[])?;
+        let plan = plan_cases(&recipe, &[CaseSpec::default()], None)?;
+        Ok(Planned { recipe, plan })
+    }
+
+    /// The file of the recipe.
+    pub(super) fn path(&self) -> &Path {
+        &self.recipe
+    }
+
+    /// Loads the recipe, with further axes of a sweep.
+    pub(super) fn load(&self, axes: &[(String, String)]) -> Result<Recipe, Fault> {
         let overrides = Overrides {
             set: self.set.clone(),
             inputs: self.input.iter().map(|(name, file)| (name.clone(), PathBuf::from(file))).collect(),
+            axes: axes.to_vec(),
         };
         let load = |path: &Path| fs::read_to_string(path).map_err(|error| error.to_string());
-        let recipe = Recipe::load(&self.recipe, &load, &overrides)?;
-        let plan = plan::plan(&recipe, &Context { catalog: CATALOG, check_file: &check_file, endings: &endings() })?;
-        Ok(Planned { recipe, plan })
+        Ok(Recipe::load(&self.recipe, &load, &overrides)?)
     }
 }
 
+/// Plans cases of a recipe over the steps that there are.
+pub(super) fn plan_cases(
+    recipe: &Recipe,
+    cases: &[CaseSpec],
+    columns: Option<&[ColumnRequest]>,
+) -> Result<Plan, Fault> {
+    let context = Context { catalog: CATALOG, check_file: &check_file, endings: &endings() };
+    Ok(plan::plan_cases(recipe, cases, columns, &context)?)
+}
+
+/// The files below a folder that fit a pattern, sorted, at most so many.
+pub(super) fn list_files(folder: &Path, pattern: &str, most: usize) -> Result<Vec<PathBuf>, String> {
+    let folder = glob::Pattern::escape(&folder.to_string_lossy());
+    let pattern = Path::new(&folder).join(pattern);
+    let found = glob::glob(&pattern.to_string_lossy()).map_err(|error| error.msg.to_owned())?;
+    let mut files: Vec<PathBuf> = found.filter_map(Result::ok).filter(|path| path.is_file()).take(most).collect();
+    files.sort();
+    Ok(files)
+}
+
 impl Planned {
+    /// The files that the recipe consists of and those that it reads.
+    pub(super) fn files(&self) -> Vec<PathBuf> {
+        let texts = texts(&self.recipe).into_iter().map(|(name, _)| PathBuf::from(name));
+        let read = self.plan.order().filter_map(|id| match &self.plan.node(id).task {
+            plan::Task::Source(source) => Some(source.path.clone()),
+            plan::Task::Step(_) | plan::Task::Gate(_) => None,
+        });
+        texts.chain(read).collect()
+    }
+
     /// Fails when a name that was given to `option` is no step of the recipe.
     pub(super) fn check_steps(&self, option: &str, names: &[String]) -> Result<(), Fault> {
         for name in names {
@@ -63,8 +104,23 @@ impl Planned {
 
 /// The texts that a recipe was read from, with the names of their files.
 pub(super) fn texts(recipe: &Recipe) -> Vec<(String, String)> {
-    let files = recipe.sources.files().iter().filter(|file| !file.name.starts_with("--"));
+    let files = recipe.sources.files().iter().filter(|file| !file.name.starts_with('-'));
     files.map(|file| (file.name.clone(), file.text.clone())).collect()
+}
+
+/// A path as a recipe in `folder` has to write it. Absolute paths stay as they are.
+pub(super) fn relative(path: &Path, folder: &Path) -> PathBuf {
+    let here = |folder: &Path| if folder.as_os_str().is_empty() { PathBuf::from(".") } else { folder.to_path_buf() };
+    let (Ok(whole), Ok(folder)) = (path.canonicalize(), std::path::absolute(here(folder))) else {
+        return path.to_path_buf();
+    };
+    if path.is_absolute() {
+        return path.to_path_buf();
+    }
+    let folder = folder.canonicalize().unwrap_or_else(|_| crate::recipe::normalize(&folder));
+    let shared = whole.components().zip(folder.components()).take_while(|(a, b)| a == b).count();
+    let up = folder.components().skip(shared).map(|_| std::path::Component::ParentDir);
+    up.chain(whole.components().skip(shared)).collect()
 }
 
 /// The endings of files that can be written.
@@ -97,7 +153,7 @@ pub(super) fn open_store(global: &Global) -> Result<Store, Fault> {
     Ok(Store::open(&root)?)
 }
 
-fn pair(text: &str) -> Result<(String, String), String> {
+pub(super) fn pair(text: &str) -> Result<(String, String), String> {
     match text.split_once('=') {
         Some((name, value)) if !name.is_empty() => Ok((name.to_owned(), value.to_owned())),
         _ => Err(format!("expected NAME=VALUE, got `{text}`")),

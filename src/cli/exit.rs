@@ -22,6 +22,8 @@ pub(super) enum Exit {
     Gate = 3,
     /// A step failed.
     Step = 4,
+    /// What is not as it was locked.
+    Locked = 5,
     /// The cache or a disk failed.
     Store = 6,
     /// Interrupted by Ctrl-C.
@@ -46,6 +48,13 @@ impl From<Status> for Exit {
             Status::StepFailed => Self::Step,
             Status::Cancelled => Self::Interrupted,
         }
+    }
+}
+
+impl Exit {
+    /// The exit of a run that is repeated.
+    pub(super) fn of_code(code: u8) -> Option<Self> {
+        [Self::Done, Self::Gate, Self::Step].into_iter().find(|exit| *exit as u8 == code)
     }
 }
 

@@ -8,8 +8,13 @@ mod check;
 mod completions;
 mod context;
 mod convert;
+mod diff;
 mod exit;
+mod goal;
 mod graph;
+mod init;
+mod lock;
+mod man;
 mod measure;
 mod picture;
 mod plan;
@@ -19,7 +24,10 @@ mod run;
 mod schema;
 mod signals;
 mod steps;
+mod sweep;
 mod trace;
+mod unchanged;
+mod watch;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -64,16 +72,22 @@ enum LogFormat {
 #[derive(Debug, Subcommand)]
 enum Command {
     Run(run::Arguments),
+    Sweep(sweep::Arguments),
+    Watch(watch::Arguments),
+    Lock(lock::Arguments),
+    Init(init::Arguments),
     Check(check::Arguments),
     Plan(plan::Arguments),
     Graph(graph::Arguments),
     Report(report::Arguments),
     Measure(measure::Arguments),
     Convert(convert::Arguments),
+    Diff(diff::Arguments),
     Steps(steps::Arguments),
     Schema(schema::Arguments),
     Cache(cache::Arguments),
     Completions(completions::Arguments),
+    Man(man::Arguments),
 }
 
 /// Parses the arguments, does what they say, and tells the exit code.
@@ -91,16 +105,22 @@ pub fn main() -> ExitCode {
     let global = &arguments.global;
     let result = std::panic::catch_unwind(|| match &arguments.command {
         Command::Run(command) => run::run(command, global),
+        Command::Sweep(command) => sweep::run(command, global),
+        Command::Watch(command) => watch::run(command, global),
+        Command::Lock(command) => lock::run(command, global),
+        Command::Init(command) => init::run(command),
         Command::Check(command) => check::run(command),
         Command::Plan(command) => plan::run(command, global),
         Command::Graph(command) => graph::run(command),
         Command::Report(command) => report::run(command, global),
         Command::Measure(command) => measure::run(command),
         Command::Convert(command) => convert::run(command),
+        Command::Diff(command) => diff::run(command),
         Command::Steps(command) => steps::run(command),
         Command::Schema(command) => schema::run(command),
         Command::Cache(command) => cache::run(command, global),
         Command::Completions(command) => completions::run(command),
+        Command::Man(command) => man::run(command),
     });
     let result = result.unwrap_or_else(|_| {
         let message = "the program reached a state that it should not; nothing partial was written";

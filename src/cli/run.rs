@@ -6,19 +6,23 @@ use std::sync::Arc;
 use super::Global;
 use super::context::{Planned, RecipeArguments, open_store};
 use super::exit::{Exit, Fault, data, say, say_failure};
+use super::lock::Held;
 use super::picture;
 use super::progress;
 use super::report;
 use super::signals::Interrupt;
 use super::trace::Trace;
+use super::unchanged::Unchanged;
 use crate::report::{Report, Status, record, table};
-use crate::run::{self, Observer, RunOptions};
+use crate::run::{self, Observer, RunError, RunOptions, RunOutcome};
+use crate::store::Store;
+use crate::store::stamp::Said;
 
 /// Run a recipe: what is not in the cache is computed, files are written where the gates hold.
 #[derive(Debug, clap::Args)]
 pub(super) struct Arguments {
     #[command(flatten)]
-    recipe: RecipeArguments,
+    pub(super) recipe: RecipeArguments,
     /// Folder of the output files. Default: `out/NAME`.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -40,58 +44,124 @@ pub(super) struct Arguments {
     /// Write a timeline for a trace viewer.
     #[arg(long, value_name = "FILE")]
     trace: Option<PathBuf>,
+    /// Fail with 5 when anything differs from the lock file. Default: `NAME.lock.ron` beside the recipe.
+    #[arg(long, value_name = "FILE", num_args = 0..=1, require_equals = true, default_missing_value = "")]
+    locked: Option<String>,
 }
 
 pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Fault> {
+    once(arguments, global, &Interrupt::listen())
+}
+
+/// One run; `watch` does more than one.
+pub(super) fn once(arguments: &Arguments, global: &Global, interrupt: &Interrupt) -> Result<Exit, Fault> {
+    let unchanged = arguments.unchanged(global);
+    if let Some(unchanged) = &unchanged
+        && let Some(exit) = unchanged.repeat(&open_store(global)?).and_then(Exit::of_code)
+    {
+        return Ok(exit);
+    }
     let planned = arguments.recipe.plan()?;
     planned.check_steps("--only", &arguments.only)?;
     planned.check_steps("--force", &arguments.force)?;
     let store = open_store(global)?;
-    let interrupt = Interrupt::listen();
-    let mut options = options(&planned, arguments.out.as_deref(), arguments.jobs)?;
+    let mut options = options(&planned, arguments.out.as_deref(), arguments.jobs, interrupt)?;
     options.only.clone_from(&arguments.only);
     options.force.clone_from(&arguments.force);
-    options.cancelled = Arc::clone(&interrupt.cancelled);
-    let mut observer: Arc<dyn Observer> = progress::observer(global.quiet, global.verbose > 0);
-    let trace = arguments.trace.as_ref().map(|_| Arc::new(Trace::new(Arc::clone(&observer))));
-    if let Some(trace) = &trace {
-        observer = Arc::clone(trace) as Arc<dyn Observer>;
+    let held = arguments.locked.as_ref().map(|file| Held::new(Path::new(file), &planned, &store, &options));
+    let held = held.transpose()?;
+    let (report, cancelled) = execute(&planned, &store, &options, global, arguments.trace.as_deref())?;
+    tell(&report, arguments.json, global.quiet)?;
+    if cancelled {
+        return Ok(interrupt.exit());
     }
-    let outcome = run::run(&planned.plan, &store, &options, &observer)?;
-    if let (Some(trace), Some(path)) = (&trace, &arguments.trace) {
-        trace.write(path)?;
+    if arguments.report {
+        report::write(&report, &store, &[], &options.out.join("report.html"))?;
     }
+    if let Some(held) = held {
+        held.check(&report, &options.out)?;
+    }
+    if let (Some(unchanged), Status::Done) = (unchanged, report.status) {
+        let out = if global.quiet { String::new() } else { table::report(&report.unchanged()) };
+        let mut files = planned.files();
+        files.extend(report.written());
+        files.push(options.out.join("run.ron"));
+        unchanged.remember(&store, files, Said { out, err: Vec::new(), exit: 0 });
+    }
+    Ok(report.status.into())
+}
+
+impl Arguments {
+    /// The short cut for this run; none where more is asked for than that everything is up to date.
+    fn unchanged(&self, global: &Global) -> Option<Unchanged> {
+        let plain =
+            self.force.is_empty() && !self.json && !self.report && self.trace.is_none() && self.locked.is_none();
+        let more = (&self.out, &self.only);
+        (plain && global.verbose == 0).then(|| Unchanged::of("run", &self.recipe, &more, global))
+    }
+}
+
+/// Runs the plan and keeps a record of it; also whether it was interrupted.
+pub(super) fn execute(
+    planned: &Planned,
+    store: &Store,
+    options: &RunOptions,
+    global: &Global,
+    trace: Option<&Path>,
+) -> Result<(Report, bool), Fault> {
+    let outcome = traced(trace, global, &|observer| run::run(&planned.plan, store, options, observer))?;
     let mut report = Report::new(&planned.recipe.name, &planned.plan, &outcome);
     report::describe(&mut report, &planned.recipe);
     if !outcome.cancelled {
-        picture::write(&planned.plan, &outcome, &store)?;
+        picture::write(&planned.plan, &outcome, store)?;
         write_record(&report, &options.out)?;
-        if arguments.report {
-            report::write(&report, &store, &[], &options.out.join("report.html"))?;
-        }
     }
-    tell(&report, arguments.json, global.quiet)?;
-    Ok(if outcome.cancelled { interrupt.exit() } else { report.status.into() })
+    Ok((report, outcome.cancelled))
+}
+
+/// A run that reports to an observer.
+type Work<'a> = dyn Fn(&Arc<dyn Observer>) -> Result<RunOutcome, RunError> + 'a;
+
+/// Runs something under the observer that suits the terminal, with a timeline where one is asked for.
+pub(super) fn traced(trace: Option<&Path>, global: &Global, work: &Work<'_>) -> Result<RunOutcome, Fault> {
+    let observer: Arc<dyn Observer> = progress::observer(global.quiet, global.verbose > 0);
+    let Some(path) = trace else { return Ok(work(&observer)?) };
+    let trace = Arc::new(Trace::new(observer));
+    let observer = Arc::clone(&trace) as Arc<dyn Observer>;
+    let outcome = work(&observer)?;
+    trace.write(path)?;
+    Ok(outcome)
 }
 
 /// The options of a run of this recipe.
-pub(super) fn options(planned: &Planned, out: Option<&Path>, jobs: Option<usize>) -> Result<RunOptions, Fault> {
+pub(super) fn options(
+    planned: &Planned,
+    out: Option<&Path>,
+    jobs: Option<usize>,
+    interrupt: &Interrupt,
+) -> Result<RunOptions, Fault> {
+    let name = planned.recipe.name.clone();
+    let jobs = jobs_of(jobs)?;
+    let out = out.map_or_else(|| Path::new("out").join(&name), Path::to_path_buf);
+    let cancelled = Arc::clone(&interrupt.cancelled);
+    Ok(RunOptions { name, out, jobs, only: Vec::new(), force: Vec::new(), cancelled })
+}
+
+/// How many tasks run at once.
+pub(super) fn jobs_of(jobs: Option<usize>) -> Result<usize, Fault> {
     if jobs == Some(0) {
         return Err(Fault::usage("--jobs 0: at least one task must run at a time"));
     }
-    let name = planned.recipe.name.clone();
-    let jobs = jobs.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, std::num::NonZero::get));
-    let out = out.map_or_else(|| Path::new("out").join(&name), Path::to_path_buf);
-    Ok(RunOptions { name, out, jobs, only: Vec::new(), force: Vec::new(), cancelled: Arc::default() })
+    Ok(jobs.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, std::num::NonZero::get)))
 }
 
-fn write_record(report: &Report, out: &Path) -> Result<(), Fault> {
+pub(super) fn write_record(report: &Report, out: &Path) -> Result<(), Fault> {
     let text =
         record::to_ron(report).map_err(|error| Fault::new(Exit::Fault, format!("cannot write run.ron: {error}")))?;
     Ok(run::write_file(&out.join("run.ron"), text.as_bytes())?)
 }
 
-fn tell(report: &Report, json: bool, quiet: bool) -> Result<(), Fault> {
+pub(super) fn tell(report: &Report, json: bool, quiet: bool) -> Result<(), Fault> {
     if json {
         let text = serde_json::to_string_pretty(report);
         data(&text.map_err(|error| Fault::new(Exit::Fault, format!("cannot write the report: {error}")))?);

@@ -1,16 +1,18 @@
 //! Plans the cases of a recipe: binds, wires and checks each one, and merges their tasks.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::bind::{BoundDecl, bind};
 use super::case::{CaseContext, CaseSpec, Context};
+use super::columns::{ColumnDecl, ColumnRequest, Columns, result};
 use super::gates::{GateDecl, gates};
 use super::merge::PlanBuilder;
 use super::outputs::{OutputDecl, outputs};
 use super::task::{GateTask, StepTask, TaskId};
 use super::wire::{Producer, Wiring, wire};
-use super::{Case, Gate, Output, OutputOptions, Plan};
+use super::{Case, Column, Gate, Output, OutputOptions, Plan};
 use crate::recipe::{Diagnostic, Diagnostics, Recipe, Span, Value};
 
 /// Plans a recipe as it is.
@@ -18,20 +20,26 @@ use crate::recipe::{Diagnostic, Diagnostics, Recipe, Span, Value};
 /// # Errors
 /// Everything that is wrong with the recipe, at once.
 pub fn plan(recipe: &Recipe, context: &Context<'_>) -> Result<Plan, Diagnostics> {
-    plan_cases(recipe, &[CaseSpec::default()], context)
+    plan_cases(recipe, &[CaseSpec::default()], None, context)
 }
 
-/// Plans several cases of a recipe as one graph.
+/// Plans several cases of a recipe as one graph. `columns` says what is measured of each: nothing, or the metrics asked
+/// for, or the usual ones where none is.
 ///
 /// # Errors
 /// Everything that is wrong with the recipe in any of the cases, at once.
-pub fn plan_cases(recipe: &Recipe, cases: &[CaseSpec], context: &Context<'_>) -> Result<Plan, Diagnostics> {
+pub fn plan_cases(
+    recipe: &Recipe,
+    cases: &[CaseSpec],
+    columns: Option<&[ColumnRequest]>,
+    context: &Context<'_>,
+) -> Result<Plan, Diagnostics> {
     let mut builder = PlanBuilder::default();
     let mut problems = recipe.problems.clone();
+    let mut state = CaseContext::new(recipe, context);
     for spec in cases {
-        let mut state = CaseContext::new(recipe, context);
-        plan_case(spec, &mut state, &mut builder);
-        problems.extend(state.problems);
+        plan_case(spec, columns, &mut state, &mut builder);
+        problems.append(&mut state.problems);
         // The faults of the first wrong cases are enough to go on with.
         if problems.len() > 1000 {
             break;
@@ -44,7 +52,12 @@ pub fn plan_cases(recipe: &Recipe, cases: &[CaseSpec], context: &Context<'_>) ->
     }
 }
 
-fn plan_case(spec: &CaseSpec, context: &mut CaseContext<'_>, builder: &mut PlanBuilder) {
+fn plan_case(
+    spec: &CaseSpec,
+    columns: Option<&[ColumnRequest]>,
+    context: &mut CaseContext<'_>,
+    builder: &mut PlanBuilder,
+) {
     let recipe = context.recipe;
     context.scope = recipe.scope(&spec.params, &mut context.problems);
     if recipe.steps.is_empty() && recipe.problems.is_empty() {
@@ -59,11 +72,24 @@ fn plan_case(spec: &CaseSpec, context: &mut CaseContext<'_>, builder: &mut PlanB
     let wiring = wire(&steps, context);
     let gates = gates(&steps, &wiring, context);
     let outputs = outputs(&steps, &wiring, context);
+    let result = result(&steps, &wiring, &outputs);
+    let reader = Columns { steps: &steps, wiring: &wiring, gates: &gates, result };
+    let columns = columns.map(|requests| reader.of(requests, context)).unwrap_or_default();
+    let result = reader.result;
     if context.problems.is_empty() && recipe.problems.is_empty() {
-        let nodes = Nodes::add(&steps, &wiring, &gates, &outputs, builder);
-        let case = nodes.case(spec, context, gates, outputs, builder);
+        let parts = Parts { gates, outputs, columns, result };
+        let nodes = Nodes::add(&steps, &wiring, &parts, builder);
+        let case = nodes.case(spec, context, parts, builder);
         builder.case(case);
     }
+}
+
+/// What hangs on the steps of a case.
+struct Parts {
+    gates: Vec<GateDecl>,
+    outputs: Vec<OutputDecl>,
+    columns: Vec<ColumnDecl>,
+    result: Option<(String, Producer)>,
 }
 
 /// The nodes of a case's outputs.
@@ -75,20 +101,20 @@ struct Nodes<'a, 'r> {
 impl<'a, 'r> Nodes<'a, 'r> {
     /// Adds a task for every output in use: by another step, a gate, an output file, or the main one of a step that
     /// nothing else uses.
-    fn add(
-        steps: &'a [BoundDecl<'r>],
-        wiring: &Wiring,
-        gates: &[GateDecl],
-        outputs: &[OutputDecl],
-        builder: &mut PlanBuilder,
-    ) -> Self {
+    fn add(steps: &'a [BoundDecl<'r>], wiring: &Wiring, parts: &Parts, builder: &mut PlanBuilder) -> Self {
         let links = wiring.producers.iter().flatten().map(|(_, producer)| *producer);
-        let gated = gates
+        let gated = parts
+            .gates
             .iter()
             .flat_map(|gate| gate.groups.iter().filter_map(|(reference, _)| *reference).chain([gate.target]));
-        let written = outputs.iter().flat_map(|output| output.producer.into_iter().chain(output.midside_on));
-        let mut used: BTreeSet<(usize, &'static str)> =
-            links.chain(gated).chain(written).map(|producer| (producer.step, producer.output.name)).collect();
+        let measured = parts.columns.iter().flat_map(|column| column.reference.into_iter().chain([column.target]));
+        let written = parts.outputs.iter().flat_map(|output| output.producer.into_iter().chain(output.midside_on));
+        let mut used: BTreeSet<(usize, &'static str)> = links
+            .chain(gated)
+            .chain(measured)
+            .chain(written)
+            .map(|producer| (producer.step, producer.output.name))
+            .collect();
         for (index, step) in steps.iter().enumerate() {
             if !used.iter().any(|(user, _)| *user == index)
                 && let Some(main) = step.def.outputs.first()
@@ -131,16 +157,11 @@ impl<'a, 'r> Nodes<'a, 'r> {
         self.ids.get(&(producer.step, producer.output.name)).copied()
     }
 
-    fn case(
-        &self,
-        spec: &CaseSpec,
-        context: &CaseContext<'_>,
-        gates: Vec<GateDecl>,
-        outputs: Vec<OutputDecl>,
-        builder: &mut PlanBuilder,
-    ) -> Case {
+    fn case(&self, spec: &CaseSpec, context: &CaseContext<'_>, parts: Parts, builder: &mut PlanBuilder) -> Case {
         let value =
             |(name, value): (&String, &Option<Value>)| Some((name.clone(), value.as_ref().map(ToString::to_string)?));
+        let file =
+            |(name, path): (&String, &Option<PathBuf>)| Some((name.clone(), path.as_ref()?.display().to_string()));
         Case {
             name: spec.name.clone(),
             params: context.scope.params.iter().filter_map(value).collect(),
@@ -149,8 +170,11 @@ impl<'a, 'r> Nodes<'a, 'r> {
                 .iter()
                 .map(|((step, output), id)| (label(&self.steps[*step].decl.name, output), *id))
                 .collect(),
-            outputs: outputs.into_iter().filter_map(|output| self.output(output)).collect(),
-            gates: gates.into_iter().filter_map(|gate| self.gate(gate, builder)).collect(),
+            outputs: parts.outputs.into_iter().filter_map(|output| self.output(output)).collect(),
+            gates: parts.gates.into_iter().filter_map(|gate| self.gate(gate, builder)).collect(),
+            inputs: context.scope.inputs.iter().filter_map(file).collect(),
+            columns: parts.columns.into_iter().filter_map(|column| self.column(column, builder)).collect(),
+            result: parts.result.and_then(|(step, producer)| Some((step, self.id(producer)?))),
         }
     }
 
@@ -175,9 +199,26 @@ impl<'a, 'r> Nodes<'a, 'r> {
         for (reference, checks) in gate.groups {
             let mut inputs = vec![("target", target)];
             inputs.extend(reference.and_then(|reference| self.id(reference)).map(|id| ("reference", id)));
-            tasks.push(builder.gate(&format!("gate {}", gate.step), GateTask { checks }, &inputs));
+            let label = match reference {
+                Some(reference) => {
+                    let other = label(&self.steps[reference.step].decl.name, reference.output.name);
+                    format!("gate {} to {other}", gate.step)
+                }
+                None => format!("gate {}", gate.step),
+            };
+            tasks.push(builder.gate(&label, GateTask { checks }, &inputs));
         }
         Some(Gate { step: gate.step, target, tasks })
+    }
+
+    fn column(&self, column: ColumnDecl, builder: &mut PlanBuilder) -> Option<Column> {
+        let mut inputs = vec![("target", self.id(column.target)?)];
+        if let Some(reference) = column.reference {
+            inputs.push(("reference", self.id(reference)?));
+        }
+        let checks = vec![column.check];
+        let task = builder.gate(&format!("measure {}", column.name), GateTask { checks }, &inputs);
+        Some(Column { name: column.name, step: column.step, metric: column.metric, task })
     }
 }
 

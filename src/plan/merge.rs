@@ -9,7 +9,7 @@ use std::path::Path;
 
 use super::key::{ContentHash, task_key};
 use super::task::{GateTask, SourceTask, StepTask, Task, TaskId};
-use super::{Case, CaseId, Node, Plan};
+use super::{Case, CaseId, Node, Plan, in_case};
 use crate::recipe::normalize;
 
 /// Collects tasks and cases.
@@ -65,7 +65,30 @@ impl PlanBuilder {
     }
 
     /// The plan.
-    pub fn finish(self) -> Plan {
+    pub fn finish(mut self) -> Plan {
+        if self.plan.cases.len() > 1 {
+            self.name_cases();
+        }
         self.plan
+    }
+
+    /// Puts the case before the label of a task that one case only has, so that labels tell cases apart.
+    fn name_cases(&mut self) {
+        let mut users: Vec<Option<usize>> = vec![None; self.plan.len()];
+        let mut shared = vec![false; self.plan.len()];
+        for (number, case) in self.plan.cases.iter().enumerate() {
+            let steps = case.steps.values().copied();
+            let judged = case.gates.iter().flat_map(|gate| gate.tasks.iter().copied());
+            for task in steps.chain(judged).chain(case.columns.iter().map(|column| column.task)) {
+                let user = users[task.index()].get_or_insert(number);
+                shared[task.index()] |= *user != number;
+            }
+        }
+        for (id, user) in self.plan.order().zip(users) {
+            if let Some(case) = user.filter(|_| !shared[id.index()]) {
+                let label = in_case(&self.plan.cases[case].name, &self.plan.graph[id].label);
+                self.plan.graph[id].label = label;
+            }
+        }
     }
 }

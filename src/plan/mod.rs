@@ -6,11 +6,14 @@
 mod bind;
 mod build;
 mod case;
+pub mod columns;
 pub mod draw;
 mod gates;
+pub mod goal;
 pub mod key;
 pub mod merge;
 mod outputs;
+pub mod sweep;
 pub mod task;
 #[cfg(test)]
 mod tests;
@@ -25,9 +28,12 @@ use petgraph::Direction;
 use petgraph::graph::DiGraph;
 use petgraph::visit::EdgeRef;
 
+use crate::metric::registry::MetricDef;
+
 pub use bind::LOCK_KEYS;
 pub use build::{plan, plan_cases};
 pub use case::{CaseSpec, Context};
+pub use columns::{COLUMN_KEYS, ColumnRequest};
 pub use gates::CHECK_KEYS;
 pub use key::{Change, ContentHash, Key, Record, task_key, task_record};
 pub use merge::PlanBuilder;
@@ -60,6 +66,25 @@ pub struct Case {
     pub outputs: Vec<Output>,
     /// Gates, in the order of the step names.
     pub gates: Vec<Gate>,
+    /// Paths of the input files by name.
+    pub inputs: BTreeMap<String, String>,
+    /// What is measured of the case, in the order asked for; empty for a plain run.
+    pub columns: Vec<Column>,
+    /// The task whose mesh is the result, as the recipe names its step.
+    pub result: Option<(String, TaskId)>,
+}
+
+/// A metric that is measured of a case.
+#[derive(Clone, Debug)]
+pub struct Column {
+    /// `STEP.METRIC`, and what it is compared with where that was said.
+    pub name: String,
+    /// The step as the recipe names it.
+    pub step: String,
+    /// The metric.
+    pub metric: &'static MetricDef,
+    /// The task that measures it: a gate of one check.
+    pub task: TaskId,
 }
 
 /// A file to write.
@@ -154,4 +179,9 @@ impl Plan {
     pub fn graph(&self) -> &DiGraph<Node, &'static str, u32> {
         &self.graph
     }
+}
+
+/// The name of a step or task within all cases: `STEP`, or `CASE/STEP` in a sweep.
+pub fn in_case(case: &str, step: &str) -> String {
+    if case.is_empty() { step.to_owned() } else { format!("{case}/{step}") }
 }

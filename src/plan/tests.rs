@@ -59,7 +59,7 @@ fn messages(text: &str) -> Vec<String> {
 fn a_recipe_becomes_a_graph() {
     let plan = planned(RECIPE);
     let labels: Vec<_> = plan.order().map(|id| plan.node(id).label.clone()).collect();
-    assert_eq!(labels, ["lab/part.stl", "raw", "clean", "fine", "gate fine", "gate fine"]);
+    assert_eq!(labels, ["lab/part.stl", "raw", "clean", "fine", "gate fine", "gate fine to clean"]);
     let case = &plan.cases()[0];
     let fine = case.steps["fine"];
     let clean = case.steps["clean"];
@@ -83,7 +83,7 @@ fn cases_share_what_they_have_in_common() {
         name: name.to_owned(),
         params: vec![("times".to_owned(), Tree { span: Span::default(), value: TreeNode::Number(times.to_owned()) })],
     };
-    let plan = plan_cases(&recipe, &[case("a", "1"), case("b", "2"), case("c", "1")], &context()).unwrap();
+    let plan = plan_cases(&recipe, &[case("a", "1"), case("b", "2"), case("c", "1")], None, &context()).unwrap();
     let [a, b, c] = plan.cases() else { panic!("three cases") };
     assert_eq!(a.steps["clean"], b.steps["clean"]);
     assert_ne!(a.steps["fine"], b.steps["fine"]);

@@ -3,6 +3,7 @@
 //! Nothing here opens a file, knows a step or runs anything: texts come from a loader, and what a step makes of its
 //! table is for the plan to check.
 
+mod argument;
 mod circle;
 pub mod diagnostic;
 pub mod expression;
@@ -22,7 +23,7 @@ pub use circle::{Order, order};
 pub use diagnostic::{Diagnostic, Diagnostics, Label, Severity};
 pub use expression::Value;
 pub use load::{Loader, normalize};
-pub use scope::Scope;
+pub use scope::{Scope, node as node_of};
 pub use source::{SourceMap, Span};
 use suggest::did_you_mean;
 pub use tree::{Entry, Node, Table, Tree};
@@ -38,6 +39,8 @@ pub struct Overrides {
     pub set: Vec<(String, String)>,
     /// `--input NAME=FILE`, relative to the working directory.
     pub inputs: Vec<(String, PathBuf)>,
+    /// `-s NAME=VALUES`: axes of a sweep.
+    pub axes: Vec<(String, String)>,
 }
 
 /// A node of the recipe's graph, as written.
@@ -115,20 +118,32 @@ impl Recipe {
         recipe.problems = parts.problems;
         recipe.check_names();
         recipe.lay_on(overrides, &mut sources);
+        for (name, text) in &overrides.axes {
+            argument::lay_axis(&mut recipe, name, text, &mut sources);
+        }
         recipe.sources = Arc::new(sources);
         Ok(recipe)
     }
 
-    /// The values of parameters and inputs, where `varied` replaces some parameters. Problems are added to `problems`.
+    /// The values of parameters and inputs, where `varied` replaces some: parameters by name, inputs as `inputs.NAME`.
+    /// Problems are added to `problems`.
     pub fn scope(&self, varied: &[(String, Tree)], problems: &mut Vec<Diagnostic>) -> Scope {
         let mut params = self.params.clone();
+        let mut files: BTreeMap<&str, Option<PathBuf>> = BTreeMap::new();
         for (name, value) in varied {
+            if let Some(input) = name.strip_prefix("inputs.").filter(|input| self.inputs.get(input).is_some()) {
+                files.insert(input, self.file(value));
+                continue;
+            }
             match params.entries.get_mut(name) {
                 Some(entry) => entry.value = value.clone(),
                 None => problems.push(unknown("parameter", "parameters", name, value.span, &self.params)),
             }
         }
-        let input = |(name, entry): (&String, &Entry)| (name.clone(), self.file(&entry.value));
+        let input = |(name, entry): (&String, &Entry)| {
+            let path = files.remove(name.as_str()).unwrap_or_else(|| self.file(&entry.value));
+            (name.clone(), path)
+        };
         let inputs: BTreeMap<_, _> = self.inputs.entries.iter().map(input).collect();
         Scope::new(&params, inputs, &self.sources, problems)
     }
@@ -172,7 +187,7 @@ impl Recipe {
             let key = Span { start: base, end: base + name.len() };
             let span = Span { start: key.end + 1, end: key.end + 1 + text.len() };
             if let Some(entry) = self.params.entries.get_mut(name) {
-                entry.value = Tree { span, value: argument(text) };
+                entry.value = Tree { span, value: argument::value(text) };
                 continue;
             }
             let mut problem = unknown("parameter", "parameters", name, key, &self.params);
@@ -191,15 +206,6 @@ impl Recipe {
                 None => self.problems.push(unknown("input", "inputs", name, key, &self.inputs)),
             }
         }
-    }
-}
-
-/// The value of a `--set`: a number or bool as TOML reads it, else the text itself.
-fn argument(text: &str) -> Node {
-    use toml::de::DeValue;
-    match DeValue::parse(text.trim()).map(|value| Tree::from_toml(value, 0).value) {
-        Ok(value @ (Node::Number(_) | Node::Bool(_) | Node::Text(_))) => value,
-        Ok(Node::Date(_) | Node::List(_) | Node::Table(_) | Node::File(_)) | Err(_) => Node::Text(text.to_owned()),
     }
 }
 

@@ -226,7 +226,7 @@ fn circle_problem(path: &[usize], names: &[&str], params: &Table) -> Diagnostic 
 }
 
 /// A value as a recipe would write it; whole numbers as integers, so that they fit integer parameters.
-fn node(value: Value) -> Node {
+pub fn node(value: Value) -> Node {
     match value {
         Value::Number(number) if number.fract() == 0.0 && number.abs() < 9e15 => {
             Node::Number(format!("{}", number as i64))

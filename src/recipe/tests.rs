@@ -115,6 +115,7 @@ fn the_command_line_replaces_parameters_and_inputs() {
             ("szie".to_owned(), "1".to_owned()),
         ],
         inputs: vec![("part".to_owned(), "here.stl".into()), ("size".to_owned(), "x".into())],
+        axes: Vec::new(),
     };
     let text = "[inputs]\npart = \"part.stl\"\n[params]\nsize = 1\ntimes = 2\n";
     let recipe = load(&[("lab/main.toml", text)], &overrides).unwrap();

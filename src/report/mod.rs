@@ -3,18 +3,23 @@
 //! [`Report`] is the one model: `run.ron` is its RON, `--json` its JSON, the terminal shows its tables. Everything that
 //! repeats from run to run stands apart from `timings`, which does not.
 
+pub mod diff;
+pub mod lock;
 pub mod measure;
 pub mod page;
 pub mod picture;
 pub mod record;
+pub mod sweep;
 pub mod table;
 
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
 use crate::metric::Measurement;
 use crate::metric::gate::GateRow;
+pub use crate::run::in_case;
 use crate::run::{
     Case, Figures, FileState, Gate, Outcome, Plan, RunOutcome, Task, TaskId, TaskOutcome, TaskState, VERSION,
 };
@@ -90,6 +95,9 @@ pub struct StepReport {
     pub key: Option<String>,
     /// The hash of its result.
     pub content: Option<String>,
+    /// The fields behind its key, so that another run can be compared with it.
+    #[serde(default)]
+    pub record: Vec<(String, String)>,
     /// Size and quality of its result.
     pub figures: Option<Figures>,
     /// What the step says of its work.
@@ -140,6 +148,10 @@ pub struct Timings {
     pub tasks: BTreeMap<String, (TaskState, f64)>,
     /// State of each output file.
     pub files: BTreeMap<String, FileState>,
+    /// By kind of step, `gate` for gates and metrics, how many tasks ran. Cases of a sweep share tasks, and each is
+    /// counted once.
+    #[serde(default)]
+    pub ran: BTreeMap<String, usize>,
 }
 
 impl Report {
@@ -154,13 +166,18 @@ impl Report {
                     let content = task.content.map(|hash| hash.to_hex().to_string());
                     inputs.insert(source.path.display().to_string(), content);
                 }
-                Task::Gate(_) => timings.note(node.label.clone(), task),
-                Task::Step(_) => {}
+                Task::Step(_) | Task::Gate(_) => timings.count(&node.task, task),
             }
         }
         for case in plan.cases() {
             for (step, task) in &case.steps {
                 timings.note(in_case(&case.name, step), outcome.task(*task));
+            }
+            let gates = case.gates.iter().flat_map(|gate| &gate.tasks);
+            for task in gates.copied().chain(case.columns.iter().map(|column| column.task)) {
+                let label = &plan.node(task).label;
+                let own = label.strip_prefix(&in_case(&case.name, "")).unwrap_or(label);
+                timings.note(in_case(&case.name, own), outcome.task(task));
             }
         }
         for file in &outcome.files {
@@ -179,6 +196,33 @@ impl Report {
         }
     }
 
+    /// The report that a run would give which finds everything as this one left it.
+    #[must_use]
+    pub fn unchanged(&self) -> Self {
+        let mut report = self.clone();
+        for (state, _) in report.timings.tasks.values_mut() {
+            if *state == TaskState::Done {
+                *state = TaskState::Cached;
+            }
+        }
+        for state in report.timings.files.values_mut() {
+            if *state == FileState::Written {
+                *state = FileState::Current;
+            }
+        }
+        report.timings.ran.clear();
+        report
+    }
+
+    /// The files that are there after the run, with their pictures.
+    pub fn written(&self) -> impl Iterator<Item = PathBuf> + '_ {
+        let files = self.cases.iter().flat_map(|case| &case.files);
+        let there = files.filter(|file| file.content.is_some()).map(|file| PathBuf::from(&file.path));
+        there
+            .flat_map(|file| [Some(file.with_extension("png")).filter(|picture| picture.is_file()), Some(file)])
+            .flatten()
+    }
+
     /// All failures of a run, with the name of what failed.
     pub fn failures(&self) -> impl Iterator<Item = (&str, &StepFailure)> {
         self.cases.iter().flat_map(|case| {
@@ -191,15 +235,21 @@ impl Report {
 }
 
 impl Timings {
+    fn count(&mut self, task: &Task, outcome: &TaskOutcome) {
+        let kind = match task {
+            Task::Step(step) => step.def.name,
+            Task::Gate(_) => "gate",
+            Task::Source(_) => return,
+        };
+        if matches!(outcome.state, TaskState::Done | TaskState::Failed) {
+            *self.ran.entry(kind.to_owned()).or_default() += 1;
+        }
+    }
+
     fn note(&mut self, name: String, task: &TaskOutcome) {
         let seconds = task.entry.as_ref().map_or(0.0, |entry| entry.seconds);
         self.tasks.insert(name, (task.state, seconds));
     }
-}
-
-/// The name of a step within all cases: `STEP`, or `CASE/STEP` in a sweep.
-pub fn in_case(case: &str, step: &str) -> String {
-    if case.is_empty() { step.to_owned() } else { format!("{case}/{step}") }
 }
 
 fn status(outcome: &RunOutcome) -> Status {
@@ -308,6 +358,7 @@ fn step_report(names: &Names<'_>, outcome: &RunOutcome, (id, name): (TaskId, &st
         inputs: names.plan.inputs(id).into_iter().map(|(input, task)| (input.to_owned(), names.of(task))).collect(),
         key: task.key.map(|key| key.to_hex().to_string()),
         content: task.content.map(|content| content.to_hex().to_string()),
+        record: task.entry.as_ref().map(|entry| entry.record.clone()).unwrap_or_default(),
         figures,
         stats: task.entry.as_ref().map(|entry| entry.stats.clone()),
         failure: task.failure.clone(),

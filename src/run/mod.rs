@@ -37,12 +37,12 @@ use std::sync::atomic::AtomicBool;
 pub use board::TaskState;
 pub use observe::{Event, Observer, Silent};
 pub use outcome::{FileOutcome, FileState, RunOutcome, TaskOutcome};
-pub use preview::{Forecast, preview};
+pub use preview::{Explained, Forecast, explain, preview, records};
 pub use schedule::run;
 pub use shared::{VERSION, recipe_task};
 
 // An outcome speaks of these, so whoever reads outcomes finds them here.
-pub use crate::plan::{Case, Gate, Plan, Task, TaskId};
+pub use crate::plan::{Case, Change, Column, Gate, Plan, Record, Task, TaskId, in_case};
 pub use crate::store::{Entry, Figures, Outcome, StoreError};
 
 /// What the caller decides about a run.

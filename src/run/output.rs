@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 
-use super::job::Finished;
+use super::job::{Finished, Node};
 use super::shared::{Shared, VERSION, recipe_task};
 use super::{FileState, RunError, whole};
 use crate::format::{self, Element, Format, WriteOptions};
@@ -38,6 +38,44 @@ pub(super) fn faults_place(shared: &Shared<'_>, case: usize, gate: usize) -> Pat
     let gates = &shared.plan.cases()[case].gates;
     let name = if gates.len() == 1 { "failed.vtu".to_owned() } else { format!("failed-{}.vtu", gates[gate].step) };
     shared.folder(case).join("failed").join(name)
+}
+
+/// How a file is, where it is right already or nothing is to be written, so that no thread is needed to find out.
+pub(super) fn settled(shared: &Shared<'_>, node: Node) -> Option<Finished> {
+    match node {
+        Node::Task(_) => None,
+        Node::File(case, position) => {
+            let output = &shared.plan.cases()[case].outputs[position];
+            let (path, passed) = place(shared, case, output)?;
+            let folder = shared.folder(case);
+            let other = if passed { folder.join("failed").join(&output.file) } else { folder.join(&output.file) };
+            if other.symlink_metadata().is_ok() {
+                return None;
+            }
+            let midside = output.options.midside_on.map(|task| shared.content(task));
+            let midside = if let Some(midside) = midside { Some(midside?) } else { None };
+            let key = file_key(shared.content(output.task)?, midside, &output.options, &output.file);
+            let current = current(shared, &key, &path).ok()?;
+            Some(Finished::File(FileState::Current, current))
+        }
+        Node::Faults(case, position) => {
+            let gate = &shared.plan.cases()[case].gates[position];
+            let mut reports = gate.tasks.iter().map(|task| shared.report(*task));
+            let none = reports.all(|report| report.is_some_and(|r| r.rows.iter().all(|row| row.faults.is_empty())));
+            let gone = faults_place(shared, case, position).symlink_metadata().is_err();
+            (none && gone).then_some(Finished::Nothing)
+        }
+    }
+}
+
+/// The hash of a file that is right already; else its hash as it is, where it is there.
+fn current(shared: &Shared<'_>, key: &ContentHash, path: &Path) -> Result<ContentHash, Option<ContentHash>> {
+    let current = if path.is_file() { shared.index.hash(path).ok() } else { None };
+    let Some(hash) = current else { return Err(None) };
+    match shared.store.entry(key).map(|entry| entry.outcome) {
+        Some(Outcome::File { content, .. }) if content == hash => Ok(hash),
+        _ => Err(current),
+    }
 }
 
 /// Sees to one output file.
@@ -90,16 +128,10 @@ fn settle(
     step: &str,
     make: impl FnOnce() -> Result<Vec<u8>, Finished>,
 ) -> Result<Finished, Finished> {
-    let current = if path.is_file() { shared.index.hash(path).ok() } else { None };
-    let expected = match shared.store.entry(key).map(|entry| entry.outcome) {
-        Some(Outcome::File { content, .. }) => Some(content),
-        Some(Outcome::Artifact { .. } | Outcome::Gate(_)) | None => None,
+    let current = match current(shared, key, path) {
+        Ok(right) => return Ok(Finished::File(FileState::Current, right)),
+        Err(current) => current,
     };
-    if let (Some(current), Some(expected)) = (current, expected)
-        && current == expected
-    {
-        return Ok(Finished::File(FileState::Current, current));
-    }
     let bytes = make()?;
     let content = blake3::hash(&bytes);
     if current != Some(content) {

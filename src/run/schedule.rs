@@ -12,7 +12,7 @@ use super::observe::Observer;
 use super::outcome::{FileOutcome, FileState, RunOutcome, TaskOutcome};
 use super::shared::{Shared, unreadable};
 use super::{RunError, RunOptions, output, tasks_of, whole};
-use crate::plan::{Plan, SourceTask, Task, TaskId};
+use crate::plan::{Plan, SourceTask, Task, TaskId, in_case};
 use crate::step::{FailureKind, StepFailure};
 use crate::store::{Entry, Outcome, Store};
 
@@ -59,7 +59,9 @@ struct Schedule<'a> {
     before: BTreeMap<TaskId, Entry>,
     forced: BTreeSet<TaskId>,
     files: BTreeMap<usize, (FileState, Option<blake3::Hash>, Option<StepFailure>)>,
-    ready: BTreeSet<usize>,
+    /// By rank: the first task of the plan first, and a file right after the last task that it waits for, so that a
+    /// case is finished and forgotten before the next one fills the memory.
+    ready: BTreeSet<(usize, usize)>,
     /// Nodes to look at.
     look: VecDeque<usize>,
     running: usize,
@@ -86,13 +88,15 @@ impl<'a> Schedule<'a> {
                 let mut from: Vec<usize> = gates.flat_map(|gate| &gate.tasks).map(|task| task.index()).collect();
                 from.push(output.task.index());
                 from.extend(output.options.midside_on.map(TaskId::index));
-                add(Node::File(number, position), output.file.display().to_string(), from);
+                let label = in_case(&case.name, &output.file.display().to_string());
+                add(Node::File(number, position), label, from);
             }
             for (position, gate) in case.gates.iter().enumerate() {
                 let mut from: Vec<usize> = gate.tasks.iter().map(|task| task.index()).collect();
                 from.push(gate.target.index());
                 from.extend(gate.tasks.iter().flat_map(|task| plan.inputs(*task)).map(|(_, input)| input.index()));
-                add(Node::Faults(number, position), format!("faults of {}", gate.step), from);
+                let label = in_case(&case.name, &format!("faults of {}", gate.step));
+                add(Node::Faults(number, position), label, from);
             }
         }
         Self {
@@ -158,7 +162,7 @@ impl<'a> Schedule<'a> {
         let mut broken = None;
         loop {
             while self.running < self.shared.options.jobs.max(1) && broken.is_none() && !self.is_cancelled() {
-                let Some(node) = self.ready.pop_first() else { break };
+                let Some((_, node)) = self.ready.pop_first() else { break };
                 self.set(node, TaskState::Running, None);
                 self.running += 1;
                 start(node, self.nodes[node]);
@@ -225,13 +229,27 @@ impl<'a> Schedule<'a> {
                 self.set(node, TaskState::Want, None);
             }
             self.set(node, TaskState::Ready, None);
-            self.ready.insert(node);
+            self.ready.insert((self.rank(node), node));
+        }
+    }
+
+    fn rank(&self, node: usize) -> usize {
+        match self.nodes[node] {
+            Node::Task(_) => node,
+            Node::File(..) | Node::Faults(..) => self.board.inputs(node).iter().copied().max().unwrap_or(node),
         }
     }
 
     /// Whether the node needs no job: its result is known, or cannot be had.
     fn look_up(&mut self, node: usize) -> bool {
-        let Node::Task(id) = self.nodes[node] else { return false };
+        let Node::Task(id) = self.nodes[node] else {
+            // What has to be made, and every fault, is for the job.
+            let found = output::settled(self.shared, self.nodes[node]);
+            return found.is_some_and(|finished| {
+                self.take_in(node, finished);
+                true
+            });
+        };
         if let Task::Source(source) = &self.shared.plan.node(id).task {
             self.hash_source(node, id, source);
             return true;

@@ -6,6 +6,7 @@
 //! ROOT/v1/cas/ef/efgh...      blob: a packed artifact under its content hash
 //! ROOT/v1/names/..            key of the newest result of a task name, for explanations only
 //! ROOT/v1/stat/HOST           content hashes of files by their stat, one small file a machine
+//! ROOT/v1/stat/HOST-run-..    stamps of whole runs
 //! ROOT/v1/tmp/..              files being written
 //! ```
 //!
@@ -24,6 +25,7 @@ pub mod codec;
 mod columns;
 pub mod entry;
 mod pack;
+pub mod stamp;
 pub mod stat_index;
 
 use std::fs;

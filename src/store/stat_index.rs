@@ -24,11 +24,18 @@ const MAX_FILES: usize = 10_000;
 
 /// What says that a file is unchanged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-struct Stat {
+pub(super) struct Stat {
     size: u64,
     /// Nanoseconds since 1970.
     modified: u64,
     inode: u64,
+}
+
+impl Stat {
+    /// Whether its file system tells fractions of a second.
+    pub(super) fn has_fractions(self) -> bool {
+        !self.modified.is_multiple_of(1_000_000_000)
+    }
 }
 
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -146,7 +153,7 @@ fn today() -> u64 {
     SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).map_or(0, |time| time.as_secs() / 86_400 * 86_400)
 }
 
-fn stat(meta: &fs::Metadata) -> Stat {
+pub(super) fn stat(meta: &fs::Metadata) -> Stat {
     let modified = meta
         .modified()
         .ok()
@@ -166,7 +173,7 @@ fn inode(_meta: &fs::Metadata) -> u64 {
 }
 
 /// A name for this machine, fit as a file name. Two machines of one name share a file, which the stat keeps safe.
-fn host() -> String {
+pub(super) fn host() -> String {
     let name = fs::read_to_string("/proc/sys/kernel/hostname").or_else(|_| fs::read_to_string("/etc/hostname"));
     let name: String =
         name.unwrap_or_default().trim().chars().filter(|c| c.is_ascii_alphanumeric() || *c == '-').collect();

@@ -34,6 +34,10 @@ struct Bounds {
 }
 
 impl Bounds {
+    fn is_empty(&self) -> bool {
+        self.at_least.is_none() && self.at_most.is_none() && self.equals.is_none()
+    }
+
     fn tolerance(bound: f64) -> f64 {
         ROUNDING * bound.abs()
     }
@@ -219,7 +223,8 @@ fn judge_whole(subject: &Subject<'_>, metric: &MetricDef, bounds: &Bounds) -> Ga
         Needs::Quads => subject.quads().faces.is_empty(),
         Needs::Mesh | Needs::Reference => false,
     };
-    out.passed = value.map_or(nothing, |v| bounds.admits(v));
+    // A check without a bound only measures.
+    out.passed = value.map_or(nothing || bounds.is_empty(), |v| bounds.admits(v));
     out.slack = value.and_then(|v| bounds.slack(v)).filter(|_| metric.unit != Unit::Flag);
     if nothing {
         out.note = Some("there is no element to judge".to_owned());

@@ -1,0 +1,121 @@
+//! `meshmill lock`: what a recipe was made of and what it gave, as a file that `run --locked` is held against.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use clap::ValueEnum;
+
+use super::Global;
+use super::context::{Planned, RecipeArguments, open_store};
+use super::exit::{Exit, Fault, say};
+use super::run::{execute, options, tell};
+use super::signals::Interrupt;
+use crate::report::lock::{Class, Lock, ingredients};
+use crate::report::{Report, Status};
+use crate::run::{self, RunOptions};
+use crate::store::Store;
+
+/// Run a recipe and lock it: `run --locked` then fails with 5 when anything differs.
+///
+/// Parameters, inputs and revisions of steps must be the same in every class; results are compared as the class says.
+#[derive(Debug, clap::Args)]
+pub(super) struct Arguments {
+    #[command(flatten)]
+    recipe: RecipeArguments,
+    /// How results are compared: by bytes, by metrics, or by metrics within --tolerance.
+    #[arg(long, value_name = "CLASS", default_value = "bytes")]
+    class: ClassName,
+    /// Largest relative difference of a metric, for the class `tolerance`.
+    #[arg(long, value_name = "NUMBER", default_value_t = 1e-6)]
+    tolerance: f64,
+    /// The lock file. Default: `NAME.lock.ron` beside the recipe.
+    #[arg(long, value_name = "FILE")]
+    to: Option<PathBuf>,
+    /// Folder of the output files. Default: `out/NAME`.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Most tasks at once, and most threads. Default: one for each processor.
+    #[arg(long, short, value_name = "N")]
+    jobs: Option<usize>,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum ClassName {
+    Bytes,
+    Metrics,
+    Tolerance,
+}
+
+pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Fault> {
+    if !(0.0..1.0).contains(&arguments.tolerance) {
+        return Err(Fault::usage("--tolerance is a number from 0 to less than 1: 0.001 is one in a thousand"));
+    }
+    let planned = arguments.recipe.plan()?;
+    let store = open_store(global)?;
+    let interrupt = Interrupt::listen();
+    let options = options(&planned, arguments.out.as_deref(), arguments.jobs, &interrupt)?;
+    let before = ingredients(&planned.recipe.name, &planned.plan, &run::records(&planned.plan, &store, &options));
+    let (report, cancelled) = execute(&planned, &store, &options, global, None)?;
+    if report.status != Status::Done {
+        tell(&report, false, global.quiet)?;
+        say("nothing was locked");
+        return Ok(if cancelled { interrupt.exit() } else { report.status.into() });
+    }
+    let class = match arguments.class {
+        ClassName::Bytes => Class::Bytes,
+        ClassName::Metrics => Class::Metrics,
+        ClassName::Tolerance => Class::Tolerance,
+    };
+    let tolerance = if class == Class::Tolerance { arguments.tolerance } else { 0.0 };
+    let lock = Lock { class, tolerance, ..before.with_results(&report, &options.out) };
+    let text = lock.to_ron().map_err(|error| Fault::new(Exit::Fault, format!("cannot write the lock: {error}")))?;
+    let file = arguments.to.clone().unwrap_or_else(|| lock_file(&planned));
+    run::write_file(&file, text.as_bytes())?;
+    if !global.quiet {
+        say(&format!("{}: locked {} tasks and {} files", file.display(), lock.tasks.len(), lock.files.len()));
+    }
+    Ok(Exit::Done)
+}
+
+fn lock_file(planned: &Planned) -> PathBuf {
+    planned.recipe.path.with_file_name(format!("{}.lock.ron", planned.recipe.name))
+}
+
+/// A lock that a run is held against.
+pub(super) struct Held {
+    file: PathBuf,
+    lock: Lock,
+    now: Lock,
+}
+
+impl Held {
+    /// Reads the lock, the usual one where `file` is empty, and fails when the run would not be of what was locked.
+    pub(super) fn new(file: &Path, planned: &Planned, store: &Store, options: &RunOptions) -> Result<Self, Fault> {
+        let file = if file.as_os_str().is_empty() { lock_file(planned) } else { file.to_path_buf() };
+        let text = fs::read_to_string(&file).map_err(|error| {
+            Fault::usage(format!("cannot read the lock {}: {error}", file.display())).help("`meshmill lock` writes one")
+        })?;
+        let lock = Lock::from_ron(&text)
+            .map_err(|error| Fault::usage(format!("{} is not a lock of this version: {error}", file.display())))?;
+        let now = ingredients(&planned.recipe.name, &planned.plan, &run::records(&planned.plan, store, options));
+        let held = Self { file, lock, now };
+        held.differs(held.lock.changed_ingredients(&held.now), "nothing has run")?;
+        Ok(held)
+    }
+
+    /// Fails when the results are not those that were locked.
+    pub(super) fn check(self, report: &Report, out: &Path) -> Result<(), Fault> {
+        let now = self.now.clone().with_results(report, out);
+        self.differs(self.lock.changed_results(&now), "the files are those of this run")
+    }
+
+    fn differs(&self, lines: Vec<String>, state: &str) -> Result<(), Fault> {
+        if lines.is_empty() {
+            return Ok(());
+        }
+        let shown: Vec<String> = lines.iter().take(60).map(|line| format!("  {line}")).collect();
+        let more = if lines.len() > 60 { format!("\n  and {} more", lines.len() - 60) } else { String::new() };
+        let message = format!("this is not what {} locked; {state}\n{}{more}", self.file.display(), shown.join("\n"));
+        Err(Fault::new(Exit::Locked, message).help("take the change back, or lock anew with `meshmill lock`"))
+    }
+}

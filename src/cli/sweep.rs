@@ -1,0 +1,186 @@
+//! `meshmill sweep`: a parameter study, all cases in one graph.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use super::Global;
+use super::context::{Planned, RecipeArguments, list_files, open_store, pair, plan_cases};
+use super::exit::{Exit, Fault, data, say};
+use super::run::{jobs_of, traced, write_record};
+use super::signals::Interrupt;
+use super::unchanged::Unchanged;
+use super::{goal, picture, progress, report};
+use crate::plan::sweep::sweep;
+use crate::recipe::Recipe;
+use crate::report::Report;
+use crate::report::sweep::{RowState, SweepTable};
+use crate::run::{self, RunOptions};
+use crate::store::stamp::Said;
+
+/// Run a recipe with many values of its parameters; what cases share runs once.
+///
+/// The axes stand in the recipe's [sweep] section or are given by -s. Each case writes to a folder of its own below
+/// --out; sweep.csv and sweep.ron hold the table.
+#[derive(Debug, clap::Args)]
+pub(super) struct Arguments {
+    #[command(flatten)]
+    recipe: RecipeArguments,
+    /// Values of a parameter or input: `1,2,4`, `1%..4%/5`, `0.1%..1%/5/log`, `a.stl,parts/*.stl`.
+    #[arg(short = 's', long = "axis", value_name = "NAME=VALUES", value_parser = pair)]
+    axes: Vec<(String, String)>,
+    /// Folder of the cases and tables. Default: `out/NAME-sweep`.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Most tasks at once, and most threads. Default: one for each processor.
+    #[arg(long, short, value_name = "N")]
+    jobs: Option<usize>,
+    /// List the cases and run nothing.
+    #[arg(long)]
+    list: bool,
+    /// Print the table as one JSON document.
+    #[arg(long, conflicts_with = "csv")]
+    json: bool,
+    /// Print the table as comma-separated values.
+    #[arg(long)]
+    csv: bool,
+    /// Write a timeline for a trace viewer.
+    #[arg(long, value_name = "FILE", conflicts_with = "goal")]
+    trace: Option<PathBuf>,
+    /// Search for the best values in the place of a grid: "min faces where min-stretch >= 0.3 and distance <= 0.2%".
+    /// The recipe's gates must hold too. The best recipe is written to `best.toml`.
+    #[arg(long, value_name = "GOAL", conflicts_with_all = ["axes", "list"])]
+    pub(super) goal: Option<String>,
+    /// A parameter that the search may change, and between which values: `size=1%..6%`.
+    #[arg(long, value_name = "NAME=FROM..TO", value_parser = pair, requires = "goal")]
+    pub(super) vary: Vec<(String, String)>,
+    /// How many cases the search may run.
+    #[arg(long, value_name = "N", default_value_t = 12, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    pub(super) evaluations: u32,
+}
+
+pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Fault> {
+    let unchanged = arguments.unchanged(global);
+    if let Some(unchanged) = &unchanged
+        && let Some(exit) = unchanged.repeat(&open_store(global)?).and_then(Exit::of_code)
+    {
+        return Ok(exit);
+    }
+    let recipe = arguments.recipe.load(&arguments.axes)?;
+    let interrupt = Interrupt::listen();
+    if arguments.goal.is_some() {
+        let (store, options) = (open_store(global)?, options(arguments, &recipe, &interrupt, "goal")?);
+        let observer = progress::observer(global.quiet, global.verbose > 0);
+        return goal::run(arguments, global, recipe, (&store, &options, observer), &interrupt);
+    }
+    let found = sweep(&recipe, &list_files)?;
+    let plan = plan_cases(&recipe, &found.cases, Some(&found.columns))?;
+    if arguments.list {
+        let names: Vec<&str> = found.cases.iter().map(|case| case.name.as_str()).collect();
+        data(&names.join("\n"));
+        return Ok(Exit::Done);
+    }
+    let (store, options) = (open_store(global)?, options(arguments, &recipe, &interrupt, "sweep")?);
+    let trace = arguments.trace.as_deref();
+    let outcome = traced(trace, global, &|observer| run::run(&plan, &store, &options, observer))?;
+    let table = SweepTable::new(&recipe.name, &found.varied, &plan, &outcome);
+    if outcome.cancelled {
+        tell(&table, arguments, global.quiet)?;
+        say("interrupted; the next sweep goes on from the last finished task");
+        return Ok(interrupt.exit());
+    }
+    picture::write(&plan, &outcome, &store)?;
+    let mut report = Report::new(&recipe.name, &plan, &outcome);
+    report::describe(&mut report, &recipe);
+    write_record(&report, &options.out)?;
+    write_tables(&table, &options.out)?;
+    let said = tell(&table, arguments, global.quiet)?;
+    // Which files a pattern finds is not known from files.
+    if let Some(unchanged) = unchanged.filter(|_| !found.lists_files && table.count(RowState::Failed) == 0) {
+        let mut files = Planned { recipe, plan }.files();
+        files.extend(report.written());
+        files.extend(["run.ron", "sweep.csv", "sweep.ron"].map(|name| options.out.join(name)));
+        unchanged.remember(&store, files, said);
+    }
+    Ok(exit(&table))
+}
+
+impl Arguments {
+    /// The short cut for this sweep; none where more is asked for than that everything is up to date.
+    fn unchanged(&self, global: &Global) -> Option<Unchanged> {
+        let plain = self.goal.is_none() && !self.list && self.trace.is_none() && global.verbose == 0;
+        let more = (&self.axes, &self.out, self.json, self.csv);
+        plain.then(|| Unchanged::of("sweep", &self.recipe, &more, global))
+    }
+}
+
+fn options(arguments: &Arguments, recipe: &Recipe, interrupt: &Interrupt, what: &str) -> Result<RunOptions, Fault> {
+    let usual = || Path::new("out").join(format!("{}-{what}", recipe.name));
+    Ok(RunOptions {
+        name: recipe.name.clone(),
+        out: arguments.out.clone().unwrap_or_else(usual),
+        jobs: jobs_of(arguments.jobs)?,
+        only: Vec::new(),
+        force: Vec::new(),
+        cancelled: Arc::clone(&interrupt.cancelled),
+    })
+}
+
+/// A case without a result counts for more than one whose gate does not hold.
+fn exit(table: &SweepTable) -> Exit {
+    if table.count(RowState::Failed) > 0 {
+        Exit::Step
+    } else if table.count(RowState::GateFailed) > 0 {
+        Exit::Gate
+    } else {
+        Exit::Done
+    }
+}
+
+pub(super) fn write_tables(table: &SweepTable, out: &Path) -> Result<(), Fault> {
+    run::write_file(&out.join("sweep.csv"), to_csv(table)?.as_bytes())?;
+    let ron = table.to_ron().map_err(|error| fault(&error))?;
+    Ok(run::write_file(&out.join("sweep.ron"), ron.as_bytes())?)
+}
+
+fn to_csv(table: &SweepTable) -> Result<String, Fault> {
+    table.to_csv().map_err(|error| fault(&error))
+}
+
+fn fault(error: &dyn std::fmt::Display) -> Fault {
+    Fault::new(Exit::Fault, format!("cannot write the table: {error}"))
+}
+
+/// The table in the form asked for.
+pub(super) fn table_text(table: &SweepTable, arguments: &Arguments, quiet: bool) -> Result<String, Fault> {
+    Ok(if arguments.json {
+        serde_json::to_string_pretty(table).map_err(|error| fault(&error))?
+    } else if arguments.csv {
+        to_csv(table)?.trim_end().to_owned()
+    } else if quiet {
+        String::new()
+    } else {
+        table.to_text()
+    })
+}
+
+/// Prints the table and what went wrong, and gives back what was said.
+fn tell(table: &SweepTable, arguments: &Arguments, quiet: bool) -> Result<Said, Fault> {
+    let out = table_text(table, arguments, quiet)?;
+    let mut err = Vec::new();
+    for row in &table.rows {
+        if let (RowState::Failed | RowState::GateFailed, Some(reason)) = (row.state, &row.reason) {
+            err.push(format!("{}: {}: {reason}", row.case, row.state.text()));
+        }
+    }
+    let (all, passed) = (table.rows.len(), table.count(RowState::Passed));
+    if passed < all && !quiet {
+        err.push(format!("{passed} of {all} cases passed"));
+    }
+    if !out.is_empty() {
+        data(&out);
+    }
+    for line in &err {
+        say(line);
+    }
+    Ok(Said { out, err, exit: exit(table) as u8 })
+}

@@ -1,0 +1,40 @@
+//! The short cut of a run or sweep in which nothing has changed since the last one.
+
+use std::path::PathBuf;
+
+use super::Global;
+use super::context::RecipeArguments;
+use super::exit::{data, say};
+use crate::store::Store;
+use crate::store::stamp::{Said, identity, program};
+
+/// Which run is meant: the program, the place, and the arguments that decide what it does and says.
+pub(super) struct Unchanged {
+    identity: blake3::Hash,
+}
+
+impl Unchanged {
+    /// `more` are arguments besides the recipe's that decide what the run does or says.
+    pub(super) fn of(what: &str, recipe: &RecipeArguments, more: &dyn std::fmt::Debug, global: &Global) -> Self {
+        let here = std::env::current_dir().unwrap_or_default();
+        let arguments = format!("{what} {recipe:?} {more:?} {}", global.quiet);
+        Self { identity: identity(&[&program(), here.as_os_str().as_encoded_bytes(), arguments.as_bytes()]) }
+    }
+
+    /// Says what that run said, and tells its exit code; `None` when anything has changed.
+    pub(super) fn repeat(&self, store: &Store) -> Option<u8> {
+        let said = store.unchanged(&self.identity)?;
+        if !said.out.is_empty() {
+            data(&said.out);
+        }
+        for line in &said.err {
+            say(line);
+        }
+        Some(said.exit)
+    }
+
+    /// Remembers a run by the files that it read and wrote.
+    pub(super) fn remember(&self, store: &Store, files: Vec<PathBuf>, said: Said) {
+        store.stamp(&self.identity, files, said);
+    }
+}

@@ -1,0 +1,177 @@
+//! Stamps of whole runs: the files that a run read and wrote, by their stat, and what it said.
+//!
+//! While every file of a stamp is as it was, the run would do nothing and say the same, so a recipe of ten thousand
+//! tasks that is up to date costs one small file and a stat a file. A stamp is a short cut and never a source: whatever
+//! is not exactly as it was is looked at task by task.
+//!
+//! As in the index of file hashes, a file that was modified just before its stat was taken is not trusted, since it may
+//! have changed again within the resolution of its clock: twenty milliseconds where times have fractions of a second,
+//! two seconds where they have none.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, SystemTime};
+
+use blake3::Hash;
+use serde::{Deserialize, Serialize};
+
+use super::Store;
+use super::stat_index::{Stat, host, stat};
+
+/// A file modified so shortly before is waited for.
+const FINE: Duration = Duration::from_millis(20);
+/// File systems without fractions of a second.
+const COARSE: Duration = Duration::from_secs(2);
+/// More stamps than this are forgotten, the oldest first.
+const MOST: usize = 500;
+
+/// What a run said that would do nothing now.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Said {
+    /// On the standard output.
+    pub out: String,
+    /// On the standard error.
+    pub err: Vec<String>,
+    /// Its exit code.
+    pub exit: u8,
+}
+
+#[derive(Serialize, Deserialize)]
+struct Stamp {
+    files: Vec<(PathBuf, Stat)>,
+    said: Said,
+}
+
+impl Store {
+    /// What the run of this identity said, if all that it read and wrote is as it was.
+    pub fn unchanged(&self, identity: &Hash) -> Option<Said> {
+        let stamp: Stamp = serde_json::from_slice(&fs::read(self.stamp_file(identity)).ok()?).ok()?;
+        let same = |(path, known): &(PathBuf, Stat)| fs::metadata(path).is_ok_and(|meta| stat(&meta) == *known);
+        stamp.files.iter().all(same).then_some(stamp.said)
+    }
+
+    /// Remembers a run by its files. Does nothing where a file cannot be trusted; failing to write costs time later and
+    /// nothing else.
+    pub fn stamp(&self, identity: &Hash, files: Vec<PathBuf>, said: Said) {
+        let Some(files) = trusted(files) else { return };
+        let path = self.stamp_file(identity);
+        if let Ok(bytes) = serde_json::to_vec(&Stamp { files, said })
+            && let Err(error) = self.write_whole(&path, &bytes)
+        {
+            tracing::warn!(%error, "the stamp of the run was not saved");
+        }
+        self.forget_old_stamps();
+    }
+
+    fn stamp_file(&self, identity: &Hash) -> PathBuf {
+        self.folder("stat").join(format!("{}{}", prefix(), &identity.to_hex()[..32]))
+    }
+
+    fn forget_old_stamps(&self) {
+        let Ok(entries) = fs::read_dir(self.folder("stat")) else { return };
+        let prefix = prefix();
+        let stamps =
+            entries.filter_map(Result::ok).filter(|entry| entry.file_name().to_string_lossy().starts_with(&prefix));
+        let mut stamps: Vec<(SystemTime, PathBuf)> =
+            stamps.filter_map(|entry| Some((entry.metadata().ok()?.modified().ok()?, entry.path()))).collect();
+        if stamps.len() > MOST {
+            stamps.sort();
+            stamps.iter().take(stamps.len() - MOST).for_each(|(_, path)| drop(fs::remove_file(path)));
+        }
+    }
+}
+
+fn prefix() -> String {
+    format!("{}-run-", host())
+}
+
+/// The files with their stats, when each is old enough; a little is waited for.
+fn trusted(files: Vec<PathBuf>) -> Option<Vec<(PathBuf, Stat)>> {
+    let begin = SystemTime::now();
+    let mut found = Vec::with_capacity(files.len());
+    let mut wait = Duration::ZERO;
+    for path in files {
+        let path = std::path::absolute(&path).ok()?;
+        let meta = fs::metadata(&path).ok()?;
+        let known = stat(&meta);
+        let age = begin.duration_since(meta.modified().ok()?).unwrap_or_default();
+        if known.has_fractions() {
+            wait = wait.max(FINE.saturating_sub(age));
+        } else if age <= COARSE {
+            return None;
+        }
+        found.push((path, known));
+    }
+    if wait > Duration::ZERO {
+        std::thread::sleep(wait);
+        // Who wrote meanwhile may have done so within one tick of the clock.
+        let same = |(path, known): &(PathBuf, Stat)| fs::metadata(path).is_ok_and(|meta| stat(&meta) == *known);
+        return found.iter().all(same).then_some(found);
+    }
+    Some(found)
+}
+
+/// The hash of everything that decides which run is meant, besides the contents of files.
+pub fn identity(parts: &[&[u8]]) -> Hash {
+    let mut hasher = blake3::Hasher::new();
+    for part in parts {
+        hasher.update(&(part.len() as u64).to_le_bytes());
+        hasher.update(part);
+    }
+    hasher.finalize()
+}
+
+/// What tells this program from another build of the same version.
+pub fn program() -> Vec<u8> {
+    let path = std::env::current_exe().unwrap_or_default();
+    let known = |path: &Path| fs::metadata(path).ok().map(|meta| stat(&meta));
+    format!("{} {:?}", path.display(), known(&path)).into_bytes()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_stamp_holds_until_a_file_changes() {
+        let folder = tempfile::tempdir().unwrap();
+        let store = Store::open(&folder.path().join("cache")).unwrap();
+        let (a, b) = (folder.path().join("a"), folder.path().join("b"));
+        fs::write(&a, "1").unwrap();
+        fs::write(&b, "2").unwrap();
+        let said = Said { out: "done".to_owned(), ..Said::default() };
+        let id = identity(&[b"run"]);
+        assert_ne!(id, identity(&[b"ru", b"n"]));
+        store.stamp(&id, vec![a.clone(), b.clone()], said.clone());
+        assert_eq!(store.unchanged(&id), Some(said.clone()));
+        assert_eq!(store.unchanged(&identity(&[b"other"])), None);
+        fs::write(&b, "3").unwrap();
+        assert_eq!(store.unchanged(&id), None);
+        store.stamp(&id, vec![a.clone(), b.clone()], said.clone());
+        assert_eq!(store.unchanged(&id), Some(said.clone()));
+        fs::remove_file(&a).unwrap();
+        assert_eq!(store.unchanged(&id), None);
+        store.stamp(&id, vec![a], said);
+        assert_eq!(store.unchanged(&id), None);
+    }
+
+    #[test]
+    fn a_file_with_a_coarse_time_is_trusted_when_it_is_old() {
+        let folder = tempfile::tempdir().unwrap();
+        let store = Store::open(&folder.path().join("cache")).unwrap();
+        let file = folder.path().join("a");
+        fs::write(&file, "1").unwrap();
+        let whole = |ago: u64| {
+            let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap().as_secs();
+            let time = SystemTime::UNIX_EPOCH + Duration::from_secs(now - ago);
+            fs::File::options().append(true).open(&file).unwrap().set_modified(time).unwrap();
+        };
+        let id = identity(&[b"run"]);
+        whole(0);
+        store.stamp(&id, vec![file.clone()], Said::default());
+        assert_eq!(store.unchanged(&id), None);
+        whole(10);
+        store.stamp(&id, vec![file.clone()], Said::default());
+        assert_eq!(store.unchanged(&id), Some(Said::default()));
+    }
+}
