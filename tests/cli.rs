@@ -221,3 +221,17 @@ fn nothing_of_a_recipe_becomes_markup_of_its_report() {
     let page = fs::read_to_string(desk.path("out/part/report.html")).unwrap();
     assert!(page.contains("&lt;img src=x onerror=1&gt;") && !page.contains("<img src=x"));
 }
+
+#[test]
+fn the_report_of_a_sweep_shows_every_case() {
+    let desk = Desk::new();
+    let recipe = format!("{RECIPE}[sweep]\ncolumns = [\"clean.faces\", \"clean.min-stretch\"]\n");
+    fs::write(desk.path("recipe.toml"), recipe).unwrap();
+    desk.meshmill(&["sweep", "recipe.toml", "-s", "limit=0.1,0.2,0.99", "--report"]).assert().code(3);
+    let page = fs::read_to_string(desk.path("out/part-sweep/report.html")).unwrap();
+    for part in ["id=\"sweep\"", "3 cases, 2 passed", "limit-0.99", "class=\"sortable\"", "Results"] {
+        assert!(page.contains(part), "no {part}");
+    }
+    desk.meshmill(&["report", "out/part-sweep", "--out", "again.html"]).assert().success();
+    assert_eq!(fs::read_to_string(desk.path("again.html")).unwrap(), page);
+}

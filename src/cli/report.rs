@@ -9,6 +9,7 @@ use super::exit::{Exit, Fault, say};
 use crate::metric::Measurement;
 use crate::recipe::{Overrides, Recipe};
 use crate::report::page::{self, Library, PageError, PageOptions};
+use crate::report::sweep::SweepTable;
 use crate::report::{Report, record};
 use crate::run::{self, Entry, Figures, Outcome, VERSION};
 use crate::step::Artifact;
@@ -17,7 +18,7 @@ use crate::store::Store;
 /// Write the page of a finished run: one HTML file with graph, metrics, charts and meshes, which works offline.
 #[derive(Debug, clap::Args)]
 pub(super) struct Arguments {
-    /// The recipe, whose last run is in `out/NAME`, or the output folder of any run.
+    /// The recipe, whose last run is in `out/NAME`, or the output folder of any run or sweep.
     #[arg(value_name = "RECIPE|OUTDIR")]
     target: PathBuf,
     /// The file to write. Default: `report.html` in the output folder.
@@ -36,17 +37,32 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Fault>
         Fault::usage(format!("{} is not the record of a run: {error}", path.display()))
             .help("run the recipe again; records of other versions cannot be read")
     })?;
+    let table = read_table(&folder)?;
     warn_of_changes(&arguments.target, &report);
     let file = arguments.out.clone().unwrap_or_else(|| folder.join("report.html"));
-    write(&report, &open_store(global)?, &arguments.step, &file)?;
+    write(&report, table.as_ref(), &open_store(global)?, &arguments.step, &file)?;
     say(&format!("{}: written", file.display()));
     Ok(Exit::Done)
 }
 
-/// Writes the page of a run.
-pub(super) fn write(report: &Report, store: &Store, steps: &[String], file: &Path) -> Result<(), Fault> {
+/// The table of a sweep, where the folder is that of one.
+fn read_table(folder: &Path) -> Result<Option<SweepTable>, Fault> {
+    let path = folder.join("sweep.ron");
+    let Ok(text) = fs::read_to_string(&path) else { return Ok(None) };
+    let table = record::sweep_from_ron(&text);
+    table.map(Some).map_err(|error| Fault::usage(format!("{} is not the table of a sweep: {error}", path.display())))
+}
+
+/// Writes the page of a run or sweep.
+pub(super) fn write(
+    report: &Report,
+    table: Option<&SweepTable>,
+    store: &Store,
+    steps: &[String],
+    file: &Path,
+) -> Result<(), Fault> {
     let options = PageOptions { steps: steps.to_vec() };
-    let page = page::html(report, &Shelf(store), &options).map_err(|error| match error {
+    let page = page::html(report, table, &Shelf(store), &options).map_err(|error| match error {
         PageError::Empty | PageError::UnknownStep { .. } => Fault::usage(error.to_string()),
         PageError::Template(_) | PageError::Data(_) => Fault::new(Exit::Fault, error.to_string()),
     })?;
@@ -60,7 +76,9 @@ fn folder(target: &Path) -> Result<PathBuf, Fault> {
     }
     let load = |path: &Path| fs::read_to_string(path).map_err(|error| error.to_string());
     let recipe = Recipe::load(target, &load, &Overrides::default())?;
-    Ok(Path::new("out").join(recipe.name))
+    let run = Path::new("out").join(&recipe.name);
+    let sweep = Path::new("out").join(format!("{}-sweep", recipe.name));
+    Ok(if !run.join("run.ron").exists() && sweep.join("run.ron").exists() { sweep } else { run })
 }
 
 fn no_record(path: &Path, error: &std::io::Error) -> Fault {

@@ -76,7 +76,7 @@ pub(super) fn once(arguments: &Arguments, global: &Global, interrupt: &Interrupt
         return Ok(interrupt.exit());
     }
     if arguments.report {
-        report::write(&report, &store, &[], &options.out.join("report.html"))?;
+        report::write(&report, None, &store, &[], &options.out.join("report.html"))?;
     }
     if let Some(held) = held {
         held.check(&report, &options.out)?;

@@ -37,6 +37,9 @@ pub(super) struct Arguments {
     /// List the cases and run nothing.
     #[arg(long)]
     list: bool,
+    /// Write `report.html` too: scatter with the Pareto front, parallel coordinates, a picture and the mesh of each case.
+    #[arg(long, conflicts_with = "goal")]
+    report: bool,
     /// Print the table as one JSON document.
     #[arg(long, conflicts_with = "csv")]
     json: bool,
@@ -93,6 +96,9 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Fault>
     report::describe(&mut report, &recipe);
     write_record(&report, &options.out)?;
     write_tables(&table, &options.out)?;
+    if arguments.report {
+        report::write(&report, Some(&table), &store, &[], &options.out.join("report.html"))?;
+    }
     let said = tell(&table, arguments, global.quiet)?;
     // Which files a pattern finds is not known from files.
     if let Some(unchanged) = unchanged.filter(|_| !found.lists_files && table.count(RowState::Failed) == 0) {
@@ -107,7 +113,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Fault>
 impl Arguments {
     /// The short cut for this sweep; none where more is asked for than that everything is up to date.
     fn unchanged(&self, global: &Global) -> Option<Unchanged> {
-        let plain = self.goal.is_none() && !self.list && self.trace.is_none() && global.verbose == 0;
+        let plain = self.goal.is_none() && !self.report && !self.list && self.trace.is_none() && global.verbose == 0;
         let more = (&self.axes, &self.out, self.json, self.csv);
         plain.then(|| Unchanged::of("sweep", &self.recipe, &more, global))
     }

@@ -6,6 +6,7 @@ use ron::ser::PrettyConfig;
 use serde::Deserialize;
 
 use super::Report;
+use super::sweep::SweepTable;
 
 /// The text of `run.ron`.
 pub fn to_ron(report: &Report) -> Result<String, ron::Error> {
@@ -15,6 +16,11 @@ pub fn to_ron(report: &Report) -> Result<String, ron::Error> {
 
 /// The report that a `run.ron` holds.
 pub fn from_ron(text: &str) -> Result<Report, ron::error::SpannedError> {
+    ron::from_str(text)
+}
+
+/// The table that a `sweep.ron` holds.
+pub fn sweep_from_ron(text: &str) -> Result<SweepTable, ron::error::SpannedError> {
     ron::from_str(text)
 }
 

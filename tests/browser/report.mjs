@@ -79,7 +79,7 @@ async function keyboard(page, name) {
     const id = await page.evaluate(() => {
       const at = document.activeElement;
       if (!at || at === document.body) return "";
-      return at.id || at.dataset?.view || at.className?.baseVal || at.className || at.tagName.toLowerCase();
+      return at.id || at.dataset?.view || at.getAttribute("class") || at.tagName.toLowerCase();
     });
     if (!id) break;
     reached.add(id.split(" ")[0]);

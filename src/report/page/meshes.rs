@@ -7,7 +7,7 @@ use serde::Serialize;
 use serde_json::{Value as Json, json};
 
 use super::column::{self, Reference, columns};
-use super::outline::{Outline, has_mesh};
+use super::outline::{CaseMesh, Outline, has_mesh};
 use super::pack::Blobs;
 use super::shown::{MeshData, shown};
 use super::worst::{Worst, worst};
@@ -96,6 +96,13 @@ pub(super) fn gather(case: &CaseReport, outline: &Outline, library: &dyn Library
             gathered.meshes.insert(step.name.clone(), Arc::clone(found));
         }
     }
+    for case in &outline.cases {
+        let drawn = known.get(&case.content).cloned().or_else(|| draw(case, library).map(Arc::new));
+        if let Some(found) = drawn {
+            known.insert(case.content.clone(), Arc::clone(&found));
+            gathered.meshes.insert(case.name.clone(), found);
+        }
+    }
     limit = first_limit(&gathered, outline);
     while pack(&mut gathered, outline, library, reference.as_ref(), limit) > MOST_BYTES && limit > 1000 {
         limit /= 2;
@@ -125,6 +132,20 @@ fn first_limit(gathered: &Gathered, outline: &Outline) -> usize {
         limit -= limit / 8;
     }
     limit
+}
+
+/// The little that is said of a case's result: its table says the rest.
+fn draw(case: &CaseMesh, library: &dyn Library) -> Option<Known> {
+    let mesh = open(library, &case.content)?;
+    let note = format!("meshmill {VERSION}, {}", case.name);
+    Some(Known {
+        content: case.content.clone(),
+        faces: mesh.soup.faces.len(),
+        shapes: Shapes::default(),
+        worst: worst(&mesh.soup, &columns(&mesh.soup, None, None)),
+        measurement: Measurement::default(),
+        picture: picture::png(&mesh.soup, PICTURE, &note).unwrap_or_default(),
+    })
 }
 
 fn find_out(name: &str, content: &str, library: &dyn Library, reference: Option<&Reference>) -> Option<Known> {
@@ -214,7 +235,8 @@ impl Gathered {
 
     /// The data of the viewer.
     pub(super) fn viewer(&self, outline: &Outline, case: &CaseReport) -> Json {
-        let kind = |name: &str| case.steps.iter().find(|step| step.name == name).map_or("", |step| step.kind.as_str());
+        let kind =
+            |name: &str| case.steps.iter().find(|step| step.name == name).map_or("case", |step| step.kind.as_str());
         let entry = |name: &'_ String| {
             let known = self.meshes.get(name)?;
             let entry = Entry { name, kind: kind(name), data: self.data.get(&known.content)?, worst: &known.worst };

@@ -20,9 +20,11 @@ mod meshes;
 mod outline;
 mod overview;
 mod pack;
+mod plot;
 mod recipe;
 mod shown;
 mod steps;
+mod sweep;
 mod text;
 mod worst;
 
@@ -30,6 +32,7 @@ use minijinja::{AutoEscape, Environment, context};
 
 use super::Report;
 use super::picture::ramp;
+use super::sweep::SweepTable;
 use crate::metric::Measurement;
 use crate::step::Artifact;
 
@@ -83,16 +86,27 @@ pub enum PageError {
     Data(#[from] serde_json::Error),
 }
 
-/// The page of a run.
-pub fn html(report: &Report, library: &dyn Library, options: &PageOptions) -> Result<String, PageError> {
-    let case = report.cases.first().ok_or(PageError::Empty)?;
-    let chosen = outline::Outline::new(case, &options.steps)?;
+/// The page of a run; of a sweep, with its table. A sweep's steps are those of its first case on the front.
+pub fn html(
+    report: &Report,
+    table: Option<&SweepTable>,
+    library: &dyn Library,
+    options: &PageOptions,
+) -> Result<String, PageError> {
+    let best = table.and_then(|table| sweep::front(table).first().map(|row| row.case.as_str()));
+    let best = report.cases.iter().find(|case| Some(case.name.as_str()) == best);
+    let case = best.or(report.cases.first()).ok_or(PageError::Empty)?;
+    let mut chosen = outline::Outline::new(case, &options.steps)?;
+    if let Some(table) = table {
+        chosen.show_cases(table, &options.steps);
+    }
     let gathered = meshes::gather(case, &chosen, library);
     let mut environment = Environment::new();
     environment.set_auto_escape_callback(|_| AutoEscape::Html);
     environment.set_trim_blocks(true);
     environment.set_lstrip_blocks(true);
     environment.add_template("page.html", include_str!("page.html"))?;
+    environment.add_template("sweep.html", include_str!("sweep.html"))?;
     let data = serde_json::to_string(&gathered.viewer(&chosen, case))?;
     let page = environment.get_template("page.html")?.render(context! {
         style => include_str!("page.css"),
@@ -103,6 +117,7 @@ pub fn html(report: &Report, library: &dyn Library, options: &PageOptions) -> Re
         has_meshes => gathered.has_meshes(),
         head => overview::head(report, case),
         tiles => overview::tiles(case, &chosen, &gathered),
+        sweep => table.map(|table| sweep::view(table, &gathered, &chosen.shown)),
         graph => overview::graph(report, case),
         steps => steps::steps(report, case, &chosen, &gathered, library),
         matrix => steps::matrix(case, &gathered),

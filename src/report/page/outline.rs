@@ -3,6 +3,8 @@
 use std::collections::BTreeMap;
 
 use super::PageError;
+use super::sweep::{front, mesh_name};
+use crate::report::sweep::{SweepRow, SweepTable};
 use crate::report::{CaseReport, StepReport};
 
 /// The plan of a page.
@@ -15,8 +17,19 @@ pub(super) struct Outline {
     pub(super) reference: Option<String>,
     /// The step that the result comes from.
     pub(super) result: Option<String>,
+    /// Results of the cases of a sweep, which are shown instead of the steps.
+    pub(super) cases: Vec<CaseMesh>,
     /// The mesh that a step began with.
     pub(super) previous: BTreeMap<String, String>,
+}
+
+/// The result of a case of a sweep.
+#[derive(Clone, Debug)]
+pub(super) struct CaseMesh {
+    /// `CASE/STEP`.
+    pub(super) name: String,
+    /// The content hash.
+    pub(super) content: String,
 }
 
 /// Whether a step gave a mesh that can be drawn.
@@ -41,7 +54,23 @@ impl Outline {
         let second = second.unwrap_or_default();
         let other = shown.iter().find(|name| **name != second).filter(|_| first == second && wanted.len() < 2);
         let pair = [other.cloned().unwrap_or(first), second];
-        Ok(Self { pair, shown, reference, result, previous: previous(case, &all) })
+        Ok(Self { pair, shown, reference, result, previous: previous(case, &all), cases: Vec::new() })
+    }
+}
+
+impl Outline {
+    /// Shows the results of a sweep's cases beside the reference, unless steps were asked for.
+    pub(super) fn show_cases(&mut self, table: &SweepTable, wanted: &[String]) {
+        let mesh = |row: &SweepRow| Some(CaseMesh { name: mesh_name(row)?, content: row.content.clone()? });
+        self.cases = table.rows.iter().filter_map(mesh).collect();
+        if !wanted.is_empty() || self.cases.is_empty() {
+            return;
+        }
+        self.shown = self.reference.iter().cloned().chain(self.cases.iter().map(|case| case.name.clone())).collect();
+        // The two ends of the front are what one compares first.
+        let front: Vec<String> = front(table).into_iter().filter_map(mesh_name).collect();
+        let first = front.first().or(self.shown.first()).cloned().unwrap_or_default();
+        self.pair = [first, front.last().or(self.shown.last()).cloned().unwrap_or_default()];
     }
 }
 
