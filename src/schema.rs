@@ -293,8 +293,8 @@ fn check(limit: &Value) -> Value {
 fn output(endings: &[&str]) -> Value {
     let file = json!({
         "type": "string",
-        "description": "File below the folder of the outputs; {param}, {name} and {step} are filled in.",
-        "pattern": format!("^=|\\.({})$", endings.join("|"))
+        "description": "File below the folder of the outputs; {param}, {name} and {step} are filled in. Patches go to JSON.",
+        "pattern": format!("^=|\\.({}|json)$", endings.join("|"))
     });
     let or_expression = |schema: Value| json!({ "anyOf": [schema, { "$ref": "#/definitions/Expression" }] });
     json!({

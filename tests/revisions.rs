@@ -52,6 +52,10 @@ const CASES: &[(&str, &str, &str)] = &[
     ("straighten", "method = \"flip-geodesic\", rounds = 3", ""),
     ("split", "", ""),
     ("split", "snap = 0, flips = false", ""),
+    ("rough-quads", "interval = 0.25", ""),
+    ("rough-quads", "interval = 0.2, thickness = { strips = 4 }, optimize = false", ""),
+    ("fit-patches", "tolerance = \"0.1%\", density = 3", ""),
+    ("fit-patches", "max-spans = 2", ""),
     ("measure", "", ""),
 ];
 
@@ -96,8 +100,17 @@ fn inputs() -> Vec<(&'static str, Artifact)> {
         ("named-grid", named(&shapes::grid(7))),
         ("curves-on-a-sphere", curves(&shapes::sphere(3))),
         ("levels-of-a-sphere", levels::levels(&shapes::sphere(3))),
+        ("bowl", bowl()),
+        ("rough-bowl", run("rough-quads", "interval = 0.3", &bowl()).artifact),
     ]);
     inputs
+}
+
+/// A curved sheet, fine enough for rough quads.
+fn bowl() -> Artifact {
+    let mut mesh = shapes::grid(40);
+    mesh.points.iter_mut().for_each(|p| p.z = p.x * p.x - 0.5 * p.y * p.y * p.x);
+    step::surface(shapes::surface(&mesh))
 }
 
 /// The hashes of all cases of a step, by input, parameters and output.
@@ -108,7 +121,10 @@ fn hashes(name: &str, inputs: &[(&'static str, Artifact)]) -> BTreeMap<String, S
     for (_, parameters, locks) in CASES.iter().filter(|(step, _, _)| *step == name) {
         for (input, artifact) in inputs.iter().filter(|(_, artifact)| main.accepts.contains(&artifact.port())) {
             for output in def.outputs {
-                let given = [(main.name, artifact.clone())];
+                let mut given = vec![(main.name, artifact.clone())];
+                if name == "fit-patches" {
+                    given.push(("surface", bowl()));
+                }
                 let made = run_locked(name, output.name, parameters, locks, &given);
                 // A refusal is an answer too.
                 let answer = match made {

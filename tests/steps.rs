@@ -16,6 +16,7 @@ mod steps {
     mod control_properties;
     mod example;
     mod features;
+    mod fit_patches;
     mod golden;
     mod improve_quality;
     mod measure;
@@ -25,6 +26,7 @@ mod steps {
     mod remove_features;
     mod repair;
     mod resolution;
+    mod rough_quads;
     mod select;
     mod split;
     mod straighten;

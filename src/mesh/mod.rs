@@ -9,6 +9,7 @@ pub mod geometry;
 pub mod halfedge;
 pub mod hierarchy;
 pub mod id;
+pub mod patches;
 pub mod predicate;
 pub mod quads;
 pub mod soup;
@@ -25,6 +26,7 @@ pub use freedom::{FreedomError, LockRules, ResolvedFreedom, Rim, resolve_freedom
 pub use halfedge::HalfedgeMesh;
 pub use hierarchy::Hierarchy;
 pub use id::{EdgeId, FaceId, HalfedgeId, Id, IdVec, VertexId};
+pub use patches::{Patch, Patches, Seam};
 pub use quads::{Cover, Quads};
 pub use soup::{Facet, Soup};
 pub use surface::Surface;

@@ -17,7 +17,7 @@ pub struct Quads {
 /// A partition of a surface's faces among the elements of a [`Quads`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Cover {
-    /// The content hash of the covered surface.
+    /// The [`shape_hash`](super::Surface::shape_hash) of the covered surface.
     pub surface: [u8; 32],
     /// For each element the faces it covers, in rising order; every face of the surface occurs once.
     pub faces: IdVec<Face, Vec<FaceId>>,

@@ -25,6 +25,21 @@ impl Surface {
         self.faces[face].map(|v| self.points[v])
     }
 
+    /// A hash of points and faces, whatever the mesh carries: what a [`Cover`](super::Cover) names its surface by.
+    ///
+    /// Little endian, bit for bit; equal on every machine.
+    pub fn shape_hash(&self) -> [u8; 32] {
+        let mut hasher = blake3::Hasher::new();
+        hasher.update(&(self.points.len() as u64).to_le_bytes());
+        for point in &self.points {
+            hasher.update(&point.to_array().map(f64::to_le_bytes).concat());
+        }
+        for corners in &self.faces {
+            hasher.update(&corners.map(|v| v.raw().to_le_bytes()).concat());
+        }
+        *hasher.finalize().as_bytes()
+    }
+
     /// The same mesh as a soup: what writers and metrics take.
     pub fn to_soup(&self) -> Soup {
         Soup {

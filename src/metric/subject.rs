@@ -7,6 +7,7 @@ use glam::DVec3;
 use super::distance::{self, Target, TwoSided};
 use super::feature::{FeatureDeviation, feature_deviation};
 use super::intersection::self_intersections;
+use super::quad_layout::{Layout, layout_counts};
 use super::quad_shape::{QuadShapes, quad_shapes};
 use super::shape::{TriangleShapes, triangle_shapes};
 use super::summary;
@@ -36,6 +37,7 @@ pub struct Subject<'a> {
     topology: OnceLock<Topology>,
     triangles: OnceLock<TriangleShapes>,
     quads: OnceLock<QuadShapes>,
+    layout: OnceLock<Layout>,
     intersections: OnceLock<Vec<(FaceId, FaceId, Meeting)>>,
     target: OnceLock<Target>,
     distance: OnceLock<Option<TwoSided>>,
@@ -53,6 +55,7 @@ impl<'a> Subject<'a> {
             topology: OnceLock::new(),
             triangles: OnceLock::new(),
             quads: OnceLock::new(),
+            layout: OnceLock::new(),
             intersections: OnceLock::new(),
             target: OnceLock::new(),
             distance: OnceLock::new(),
@@ -106,6 +109,11 @@ impl<'a> Subject<'a> {
     /// Figures of each quad.
     pub fn quads(&self) -> &QuadShapes {
         self.quads.get_or_init(|| quad_shapes(self.mesh))
+    }
+
+    /// Irregular vertices of a layout of quads.
+    pub fn layout(&self) -> &Layout {
+        self.layout.get_or_init(|| layout_counts(self.mesh))
     }
 
     /// Pairs of faces that intersect. Empty when cancelled; ask the watch afterwards.

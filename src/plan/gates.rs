@@ -54,7 +54,7 @@ pub(super) fn gates(steps: &[BoundDecl<'_>], wiring: &Wiring, context: &mut Case
 
 pub(super) fn is_mesh(port: Port) -> bool {
     match port {
-        Port::Soup | Port::Surface | Port::Quads => true,
+        Port::Soup | Port::Surface | Port::Quads | Port::Patches => true,
         Port::File | Port::Hierarchy | Port::Metrics => false,
     }
 }

@@ -203,6 +203,10 @@ impl Reader<'_, '_> {
     fn ending_fits(&mut self, path: &Path, name: &str, port: Option<Port>, span: Span) -> bool {
         let ending = path.extension().map(|ending| ending.to_string_lossy().to_lowercase()).unwrap_or_default();
         let table = METRIC_ENDINGS.contains(&ending.as_str());
+        // Patches go to JSON as they are, to a mesh file as their tessellation.
+        if port == Some(Port::Patches) && ending == "json" {
+            return true;
+        }
         if !self.context.endings.contains(&ending.as_str()) {
             let help = did_you_mean(&ending, "endings", self.context.endings.iter().copied());
             self.problem(span, format!("`{name}` has no ending of a format that can be written"), help);

@@ -22,6 +22,10 @@ pub(super) fn figures(artifact: &Artifact) -> Figures {
             let mesh = &quads.mesh;
             Figures { port, ..of_mesh(mesh.points.len(), mesh.faces.len(), &stretches(mesh)) }
         }
+        Artifact::Patches(patches) => {
+            let mesh = &patches.tessellation;
+            Figures { port, ..of_mesh(mesh.points.len(), mesh.faces.len(), &stretches(mesh)) }
+        }
         Artifact::Metrics(metrics) => Figures { port, metrics: Some((**metrics).clone()), ..Figures::default() },
     }
 }

@@ -24,6 +24,7 @@ mod job;
 pub mod observe;
 pub mod outcome;
 mod output;
+mod patches;
 pub mod preview;
 mod schedule;
 mod shared;

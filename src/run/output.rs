@@ -200,6 +200,9 @@ fn encode(
     content: ContentHash,
 ) -> Result<Vec<u8>, StepFailure> {
     let name = file.file_name().unwrap_or_default().to_string_lossy();
+    if let (Artifact::Patches(patches), true) = (artifact, name.to_ascii_lowercase().ends_with(".json")) {
+        return Ok(super::patches::json(patches, &header(content)));
+    }
     let format = Format::from_file_name(&name).ok_or_else(|| unknown_ending(&name))?;
     let soup = artifact.to_soup().ok_or_else(|| StepFailure::failed(format!("a {} is not a mesh", artifact.port())))?;
     let element = options.element.as_deref().map(element).transpose()?;

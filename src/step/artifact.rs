@@ -6,7 +6,7 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 
 use super::failure::StepFailure;
-use crate::mesh::{Hierarchy, Quads, Soup, Surface};
+use crate::mesh::{Hierarchy, Patches, Quads, Soup, Surface};
 use crate::metric::Measurement;
 
 /// The type of an input or output, checked before anything runs.
@@ -23,6 +23,8 @@ pub enum Port {
     Hierarchy,
     /// A quad-dominant mesh.
     Quads,
+    /// Smooth surfaces over a quad-dominant mesh.
+    Patches,
     /// A table of metrics.
     Metrics,
 }
@@ -35,6 +37,7 @@ impl fmt::Display for Port {
             Self::Surface => "surface",
             Self::Hierarchy => "hierarchy",
             Self::Quads => "quads",
+            Self::Patches => "patches",
             Self::Metrics => "metrics",
         })
     }
@@ -62,6 +65,8 @@ pub enum Artifact {
     Hierarchy(Arc<Hierarchy>),
     /// See [`Port::Quads`].
     Quads(Arc<Quads>),
+    /// See [`Port::Patches`].
+    Patches(Arc<Patches>),
     /// See [`Port::Metrics`].
     Metrics(Arc<Measurement>),
 }
@@ -75,6 +80,7 @@ impl Artifact {
             Self::Surface(_) => Port::Surface,
             Self::Hierarchy(_) => Port::Hierarchy,
             Self::Quads(_) => Port::Quads,
+            Self::Patches(_) => Port::Patches,
             Self::Metrics(_) => Port::Metrics,
         }
     }
@@ -111,12 +117,13 @@ impl Artifact {
         }
     }
 
-    /// Any mesh as a soup, for writers and metrics; `None` for files, hierarchies and metrics.
+    /// Any mesh, or the tessellation of patches, as a soup, for writers and metrics; `None` for files, hierarchies and metrics.
     pub fn to_soup(&self) -> Option<Arc<Soup>> {
         match self {
             Self::Soup(soup) => Some(Arc::clone(soup)),
             Self::Surface(surface) => Some(Arc::new(surface.to_soup())),
             Self::Quads(quads) => Some(Arc::new(quads.mesh.clone())),
+            Self::Patches(patches) => Some(Arc::new(patches.tessellation.clone())),
             Self::File(_) | Self::Hierarchy(_) | Self::Metrics(_) => None,
         }
     }

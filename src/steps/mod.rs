@@ -5,6 +5,7 @@ pub mod adapt_density;
 pub mod adapt_region;
 pub mod control_properties;
 pub mod features;
+pub mod fit_patches;
 pub mod improve_quality;
 pub mod measure;
 pub mod partition;
@@ -13,6 +14,7 @@ pub mod refine;
 pub mod remove_features;
 pub mod repair;
 pub mod resolution;
+pub mod rough_quads;
 pub mod select;
 pub mod split;
 pub mod straighten;
@@ -38,5 +40,7 @@ pub static CATALOG: &[StepDef] = &[
     StepDef::of::<partition::Step>(),
     StepDef::of::<straighten::Step>(),
     StepDef::of::<split::Step>(),
+    StepDef::of::<rough_quads::Step>(),
+    StepDef::of::<fit_patches::Step>(),
     StepDef::of::<measure::Step>(),
 ];

@@ -21,6 +21,7 @@ use crate::step::{Artifact, FileBytes, Port};
 mod cover;
 mod curves;
 mod forest;
+mod patches;
 
 /// Raised whenever the canonical bytes of equal artifacts change; part of every key.
 pub const CODEC_VERSION: u16 = 2;
@@ -77,6 +78,11 @@ pub fn encode(artifact: &Artifact) -> Vec<u8> {
             cover::encode(&mut writer, quads.cover.as_ref());
             writer.finish()
         }
+        Artifact::Patches(patches) => {
+            let mut writer = start(Port::Patches, patches.tessellation.points.len() * 40);
+            patches::encode(&mut writer, patches);
+            writer.finish()
+        }
         Artifact::Metrics(metrics) => {
             let mut writer = start(Port::Metrics, 4096);
             writer.bytes(&serde_json::to_vec(&**metrics).unwrap_or_default());
@@ -110,6 +116,7 @@ pub fn decode(bytes: &[u8]) -> Result<Artifact, CodecError> {
             let cover = cover::decode(&mut reader, mesh.faces.len())?;
             Artifact::Quads(Arc::new(Quads { mesh, cover }))
         }
+        6 => Artifact::Patches(Arc::new(patches::decode(&mut reader)?)),
         _ => return Err(CodecError::Malformed("unknown kind of artifact")),
     };
     reader.end()?;
@@ -126,6 +133,7 @@ fn start(port: Port, capacity: usize) -> ColumnWriter {
         Port::Metrics => 3,
         Port::Hierarchy => 4,
         Port::Quads => 5,
+        Port::Patches => 6,
     };
     ColumnWriter::new([a, b, c, d, low, high, tag, 0], capacity + 1024)
 }

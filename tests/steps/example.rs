@@ -14,7 +14,10 @@ use meshmill::store::Store;
 use crate::shapes;
 
 /// What the snippets name.
-const BEFORE: &str = "[inputs]\npart = \"part.obj\"\n\
+const BEFORE: &str = "[inputs]\npart = \"part.obj\"\nopen = \"sheet.obj\"\n\
+    [steps.flat]\nuse = \"read\"\nfile = \"=inputs.open\"\n\
+    [steps.sheet]\nuse = \"repair\"\nfrom = \"flat\"\n\
+    [steps.rough]\nuse = \"rough-quads\"\nfrom = \"sheet\"\ninterval = \"25%\"\n\
     [steps.raw]\nuse = \"read\"\nfile = \"=inputs.part\"\n\
     [steps.clean]\nuse = \"repair\"\nfrom = \"raw\"\n\
     [steps.marked]\nuse = \"features\"\nfrom = \"clean\"\n\
@@ -24,9 +27,12 @@ const BEFORE: &str = "[inputs]\npart = \"part.obj\"\n\
 
 /// A slender bar as an OBJ file: small steps in percent of its diagonal stay few.
 fn bar() -> String {
-    let mesh = shapes::cylinder(8, 1);
-    let points = mesh.points.iter().map(|p| format!("v {} {} {}\n", 0.05 * p.x, 0.05 * p.y, p.z));
-    let faces = shapes::faces(&mesh).into_iter().map(|[a, b, c]| format!("f {} {} {}\n", a + 1, b + 1, c + 1));
+    obj(&shapes::cylinder(8, 1), 0.05)
+}
+
+fn obj(mesh: &meshmill::mesh::Soup, width: f64) -> String {
+    let points = mesh.points.iter().map(|p| format!("v {} {} {}\n", width * p.x, width * p.y, p.z));
+    let faces = shapes::faces(mesh).into_iter().map(|[a, b, c]| format!("f {} {} {}\n", a + 1, b + 1, c + 1));
     points.chain(faces).collect()
 }
 
@@ -57,6 +63,7 @@ fn runs(step: &StepDef, folder: &Path) {
 fn every_example_runs() {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("part.obj"), bar()).unwrap();
+    fs::write(folder.path().join("sheet.obj"), obj(&shapes::grid(20), 1.0)).unwrap();
     for step in CATALOG {
         assert!(step.example.contains(&format!("use = \"{}\"", step.name)), "the example of `{}`", step.name);
         runs(step, folder.path());

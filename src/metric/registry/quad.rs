@@ -3,13 +3,17 @@
 use super::super::Value;
 use super::super::subject::Subject;
 use super::super::summary::{count, finite_mean, max, mean, min, number, percentile, share_below};
-use super::Direction::{Higher, Lower};
+use super::Direction::{Higher, Lower, Neutral};
 use super::Needs::Quads;
 use super::Unit::{Count, Degrees, Ratio, Share};
 use super::{LOW_SCALED_JACOBIAN, MetricDef, metric};
 
 fn with_quads(s: &Subject<'_>, figure: impl Fn(&Subject<'_>) -> usize) -> Option<Value> {
     if s.quads().faces.is_empty() { None } else { count(figure(s)) }
+}
+
+fn layout_share(s: &Subject<'_>, count: usize) -> Option<Value> {
+    number((!s.quads().faces.is_empty()).then(|| count as f64 / s.layout().vertices.max(1) as f64))
 }
 
 pub(super) static METRICS: &[MetricDef] = &[
@@ -91,6 +95,26 @@ pub(super) static METRICS: &[MetricDef] = &[
     metric("irregular-vertices", Count, Lower, Quads, "Inner vertices whose valence is not 4.", |s| {
         with_quads(s, |s| s.inner_and_irregular().1.len())
     }),
+    metric("triangle-share", Share, Lower, Quads, "Triangles / all faces of a mesh that has quads.", |s| {
+        let faces = s.mesh().faces.len();
+        number((!s.quads().faces.is_empty()).then(|| s.triangles().faces.len() as f64 / faces as f64))
+    }),
+    metric(
+        "irregular-patch-share",
+        Share,
+        Lower,
+        Quads,
+        "Vertices inside of other than 4 faces, and on smooth borders of other than 2, / all vertices.",
+        |s| layout_share(s, s.layout().irregular.len()),
+    ),
+    metric(
+        "forced-irregular-share",
+        Share,
+        Neutral,
+        Quads,
+        "Irregular vertices that the Euler number and the corners force, / all vertices.",
+        |s| layout_share(s, s.layout().forced),
+    ),
     metric("irregular-share", Share, Lower, Quads, "Share of irregular among inner vertices.", |s| {
         let (inner, irregular) = s.inner_and_irregular();
         number((!s.quads().faces.is_empty()).then(|| irregular.len() as f64 / inner.max(1) as f64))

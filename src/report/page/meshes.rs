@@ -72,9 +72,12 @@ fn open(library: &dyn Library, content: &str) -> Option<Mesh> {
     let soup = artifact.to_soup()?;
     let surface = match artifact {
         Artifact::Surface(surface) => Some(surface),
-        Artifact::File(_) | Artifact::Soup(_) | Artifact::Hierarchy(_) | Artifact::Quads(_) | Artifact::Metrics(_) => {
-            None
-        }
+        Artifact::File(_)
+        | Artifact::Soup(_)
+        | Artifact::Hierarchy(_)
+        | Artifact::Quads(_)
+        | Artifact::Patches(_)
+        | Artifact::Metrics(_) => None,
     };
     Some(Mesh { soup, surface })
 }

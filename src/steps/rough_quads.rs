@@ -1,0 +1,295 @@
+//! Cuts a surface into coarse quads along its borders, each with the faces that it covers.
+//!
+//! # Algorithm
+//! Strips of triangles grow from all borders at once; a graph of them is simplified to belts. The outer loop of a belt
+//! gets nodes at even distances, connectors run from them straight across to the inner loop, and what lies between two
+//! of them is an element: a quad, or a triangle where two connectors meet. A belt with several holes has them joined, one
+//! without gets a hole without area: a central node or path. Then triangles are coupled, and a triangle that touches the
+//! rim with one corner is opened to a quad. The belts are the work of `technique::belts`, the complex that they become
+//! that of `technique::layout`.
+//!
+//! Based on: T. Itoh, A. Yamada, T. Furuhata, K. Inoue, K. Shimada. Rough Quadrilateralation of Triangular Meshes via
+//! Belt-like Subregioning for Surface Reconstruction. IBM Research Report RT0354, 2000.
+//!
+//! # Invariants
+//! - Nodes are vertices of the surface, edges are paths over its edges, and paths never cross.
+//! - Every face is covered once; what an element covers is a disk with the element's corners on its rim.
+//! - The complex has the Euler number of the surface; regions conform along their common arcs.
+//!
+//! # Cost
+//! O(F log F) for the belts. Optimisation changes cavities of a few elements at a time, O(n log n) in their faces each.
+//!
+//! # Departures
+//! - Strips are found in one search from all borders, so that the result does not depend on the order of loops.
+//! - Strips of one border are put together by their distance before the graph is simplified, so that belts have the
+//!   thickness asked for; the graph then merges what is left over.
+//! - Elements are bounded by paths over edges. A connector is the path that hugs the straight walk, and of a fan every
+//!   second spoke is drawn, as if its triangles were coupled at once: few edges meet in a vertex.
+//! - Closed surfaces, which the paper leaves open, are cut along the borders of their regions and along marked edges.
+
+use std::sync::Arc;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::mesh::geometry::Aabb;
+use crate::mesh::{FaceId, Quads, Surface};
+use crate::metric::quad_layout::{Layout as Counts, layout_counts};
+use crate::step::{
+    Artifact, ElementRef, InputDef, Inputs, Length, Locks, OutPort, OutputDef, Port, Produced, Step as StepContract,
+    StepFailure,
+};
+use crate::technique::belts::{BeltRules, Thickness, cut_belts};
+use crate::technique::layout::optimise::{OptimiseReport, optimise, polygonise};
+use crate::technique::layout::{Ground, Layout, to_quads};
+use crate::watch::{Cancelled, Watch};
+
+/// Cuts a surface into coarse quads that follow its borders, each with the faces that it covers.
+///
+/// The surface must be fine: ten edges or more along an element, see `refine`. A closed surface must have regions.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default, rename_all = "kebab-case")]
+pub struct RoughQuadsParams {
+    /// How far apart the nodes on borders lie, which is about the size of the elements. Default 6 % of the diagonal.
+    pub interval: Length,
+    /// How thick belts are: a length, or strips of triangles as a table `{ strips = 8 }`. Default: as `interval`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub thickness: Option<BeltThickness>,
+    /// A connector starts where the border's angle inside is at least this many degrees. Default 120.
+    #[schemars(range(min = 90.0, max = 180.0))]
+    pub min_angle: f64,
+    /// Whether connectivity is improved after the paper's post-processing: triangles are paired along paths, nodes with
+    /// too many or too few elements are repaired. Default true; `false` is the paper's method.
+    pub optimize: bool,
+}
+
+/// How thick belts are.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum BeltThickness {
+    /// Counted in strips of triangles.
+    Strips {
+        /// How many.
+        strips: usize,
+    },
+    /// A length along the surface.
+    Length(Length),
+}
+
+impl Default for RoughQuadsParams {
+    fn default() -> Self {
+        Self { interval: Length::Percent(6.0), thickness: None, min_angle: 120.0, optimize: true }
+    }
+}
+
+/// What was made. Counts are taken on the result.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub struct RoughQuadsStats {
+    /// Regions, or parts between marked edges, that were cut each on its own.
+    pub domains: usize,
+    /// Strips of triangles.
+    pub strips: usize,
+    /// Belts that the strips were merged into.
+    pub belts: usize,
+    /// Connectors laid across belts.
+    pub connectors: usize,
+    /// Pairs of triangles coupled, and triangles opened at the rim, after the belts were cut.
+    pub post_processed: usize,
+    /// Pairs of triangles that optimisation brought together.
+    pub paired_triangles: usize,
+    /// Nodes that optimisation put on borders, because an odd number of edges leaves a triangle over.
+    pub parity_nodes: usize,
+    /// Local edits and cavities filled anew by optimisation.
+    pub edits: usize,
+    /// Quads.
+    pub quads: usize,
+    /// Triangles.
+    pub triangles: usize,
+    /// Share of triangles, the paper's epsilon-t.
+    pub triangle_share: f64,
+    /// Share of vertices with other than four elements inside or two on smooth borders, the paper's epsilon-v.
+    pub irregular_share: f64,
+    /// The share of vertices that must be irregular by Euler's formula.
+    pub forced_share: f64,
+}
+
+/// Why rough quads cannot be had.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum RoughQuadsError {
+    /// A length or angle is out of range.
+    #[error("{name} must be {range}, got {value}")]
+    OutOfRange {
+        /// The parameter.
+        name: &'static str,
+        /// What it may be.
+        range: &'static str,
+        /// What it is.
+        value: f64,
+    },
+    /// A part has no border to begin at.
+    #[error("the part with face {face} has no border, where belts begin")]
+    NoBorder {
+        /// A face of it.
+        face: FaceId,
+    },
+    /// Elements of this size do not fit between the edges of the mesh.
+    #[error("the mesh is too coarse for elements of this size at {} places, the first at face {}", faces.len(), faces[0])]
+    TooCoarse {
+        /// A face at each place.
+        faces: Vec<FaceId>,
+    },
+    /// The run was interrupted.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+}
+
+/// Cuts `surface` into coarse quads.
+///
+/// # Errors
+/// See [`RoughQuadsError`].
+pub fn rough_quads(
+    surface: &Surface,
+    params: &RoughQuadsParams,
+    watch: &Watch,
+) -> Result<(Quads, RoughQuadsStats), RoughQuadsError> {
+    let ground = Ground::new(surface);
+    let rules = rules(surface, params)?;
+    check_borders(&ground)?;
+    let (mut layout, bad, belts) = cut_belts(&ground, &rules, watch)?;
+    let mut stuck = polygonise(&mut layout, watch)?;
+    let mut post_processed = layout.couple_triangles() + layout.open_triangles();
+    post_processed += layout.couple_triangles();
+    let places: Vec<FaceId> = bad.iter().map(|b| b.face).collect();
+    refuse(places)?;
+    let mut report = OptimiseReport::default();
+    if params.optimize {
+        report = optimise(&mut layout, watch)?;
+        stuck = polygonise(&mut layout, watch)?;
+    }
+    refuse(stuck_faces(&layout, &stuck))?;
+    let quads = to_quads(&layout);
+    let Counts { triangles, irregular, forced, vertices } = layout_counts(&quads.mesh);
+    let elements = quads.mesh.faces.len();
+    let stats = RoughQuadsStats {
+        domains: ground.domains,
+        strips: belts.strips,
+        belts: belts.belts,
+        connectors: belts.connectors,
+        post_processed,
+        paired_triangles: report.pairs,
+        parity_nodes: report.parity_nodes,
+        edits: report.edits + report.cavities,
+        quads: elements - triangles,
+        triangles,
+        triangle_share: triangles as f64 / elements.max(1) as f64,
+        irregular_share: irregular.len() as f64 / vertices.max(1) as f64,
+        forced_share: forced as f64 / vertices.max(1) as f64,
+    };
+    Ok((quads, stats))
+}
+
+fn rules(surface: &Surface, params: &RoughQuadsParams) -> Result<BeltRules, RoughQuadsError> {
+    let diagonal = Aabb::of(surface.points.iter().copied()).diagonal();
+    let check = |name, range, value: f64, holds: bool| {
+        if holds { Ok(()) } else { Err(RoughQuadsError::OutOfRange { name, range, value }) }
+    };
+    let interval = params.interval.resolve(diagonal);
+    check("interval", "above 0", interval, interval > 0.0)?;
+    check("min-angle", "from 90 to 180", params.min_angle, (90.0..=180.0).contains(&params.min_angle))?;
+    let thickness = match &params.thickness {
+        None => Thickness::Length(interval),
+        Some(BeltThickness::Strips { strips }) => {
+            check("strips", "at least 1", *strips as f64, *strips >= 1)?;
+            Thickness::Strips(*strips)
+        }
+        Some(BeltThickness::Length(length)) => {
+            let length = length.resolve(diagonal);
+            check("thickness", "above 0", length, length > 0.0)?;
+            Thickness::Length(length)
+        }
+    };
+    Ok(BeltRules { thickness, interval, min_angle: params.min_angle })
+}
+
+/// Each part must have a border.
+fn check_borders(ground: &Ground<'_>) -> Result<(), RoughQuadsError> {
+    let mut has_border = vec![false; ground.domains];
+    for (face, across) in ground.across.enumerate() {
+        let domain = ground.domain[face];
+        has_border[domain as usize] |= across.iter().any(|g| g.is_none_or(|g| ground.domain[g] != domain));
+    }
+    let closed = ground.domain.enumerate().find(|(_, d)| !has_border[**d as usize]);
+    closed.map_or(Ok(()), |(face, _)| Err(RoughQuadsError::NoBorder { face }))
+}
+
+fn refuse(mut faces: Vec<FaceId>) -> Result<(), RoughQuadsError> {
+    faces.sort_unstable();
+    faces.dedup();
+    if faces.is_empty() { Ok(()) } else { Err(RoughQuadsError::TooCoarse { faces }) }
+}
+
+/// A face of each cell that is neither a triangle nor a quad.
+fn stuck_faces(layout: &Layout<'_>, stuck: &[u32]) -> Vec<FaceId> {
+    let left = stuck.iter().copied().filter(|&c| layout.exists(c));
+    let odd = layout.cells().filter(|&c| !(3..=4).contains(&layout.ring(c).len()));
+    left.chain(odd)
+        .filter(|&c| !(3..=4).contains(&layout.ring(c).len()))
+        .filter_map(|c| layout.faces(c).first().copied())
+        .collect()
+}
+
+impl RoughQuadsError {
+    fn failure(self, surface: &Surface) -> StepFailure {
+        let message = self.to_string();
+        let element = |face: &FaceId| ElementRef {
+            kind: "face".to_owned(),
+            id: u64::from(face.raw()),
+            at: Some(crate::mesh::geometry::centroid(surface.corners(*face))),
+        };
+        match self {
+            Self::Cancelled(cancelled) => cancelled.into(),
+            Self::OutOfRange { .. } => StepFailure::failed(message),
+            Self::NoBorder { face } => StepFailure::failed(message)
+                .with_help("run `partition` first, or mark closed curves with `features`")
+                .with_elements(vec![element(&face)]),
+            Self::TooCoarse { faces } => StepFailure::failed(message)
+                .with_help("run `refine` with a smaller `max-edge` first, or raise `interval`")
+                .with_elements(faces.iter().take(32).map(element).collect()),
+        }
+    }
+}
+
+/// The room's entry in the catalog.
+#[derive(Debug)]
+pub struct Step;
+
+impl StepContract for Step {
+    const NAME: &'static str = "rough-quads";
+    const REVISION: u32 = 1;
+    const INPUTS: &'static [InputDef] = &[InputDef {
+        name: "from",
+        accepts: &[Port::Surface],
+        required: true,
+        doc: "the surface to cut, finer than the elements",
+    }];
+    const OUTPUTS: &'static [OutputDef] = &[OutputDef { name: "main", port: OutPort::Is(Port::Quads) }];
+    const CARRIES: &'static str = "regions are mapped, and face groups where they hold all faces of an element; rims and \
+        borders of regions are marked, corners pinned; other groups, seams and fields are dropped";
+    const EXAMPLE: &'static str = "use = \"rough-quads\"\nfrom = \"sheet\"\ninterval = \"25%\"\n";
+
+    type Params = RoughQuadsParams;
+    type Stats = RoughQuadsStats;
+
+    fn run(
+        inputs: &Inputs,
+        _output: &str,
+        params: &RoughQuadsParams,
+        _locks: &Locks,
+        watch: &Watch,
+    ) -> Result<Produced<RoughQuadsStats>, StepFailure> {
+        let surface = inputs.surface("from")?;
+        let (quads, stats) = rough_quads(surface, params, watch).map_err(|error| error.failure(surface))?;
+        Ok(Produced { artifact: Artifact::Quads(Arc::new(quads)), stats })
+    }
+}

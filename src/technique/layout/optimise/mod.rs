@@ -1,0 +1,77 @@
+//! Improves the connectivity of a layout: no triangles, four patches round inner nodes, two at smooth borders.
+//!
+//! Triangles walk through quads along shortest dual paths until two meet and become a quad; then local edits and
+//! larger cavities are filled anew wherever that lowers the cost: the squared excess of patches at each node, more on
+//! borders. This is the objective of the clean-up in advancing-front quad meshing. Every edit is carried out in the
+//! mesh at once, so that the layout stays embedded.
+//!
+//! Based on: P. Kinney. CleanUp: Improving Quadrilateral Finite Element Meshes. 6th International Meshing Roundtable,
+//! 1997. S. Owen, M. Staten, S. Canann, S. Saigal. Q-Morph: An Indirect Approach to Advancing Front Quad Meshing.
+//! IJNME 44, 1999.
+
+mod cavity;
+mod local;
+mod relax;
+mod triangles;
+
+use super::Layout;
+use crate::watch::{Cancelled, Watch};
+
+/// What optimisation did.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct OptimiseReport {
+    /// Pairs of triangles that met.
+    pub pairs: usize,
+    /// Nodes put on borders to make the number of their edges even.
+    pub parity_nodes: usize,
+    /// Local edits.
+    pub edits: usize,
+    /// Cavities filled anew.
+    pub cavities: usize,
+}
+
+/// New cells of less quality are refused, unless the old ones were worse.
+const LEAST: f64 = 0.03;
+
+/// Makes triangles and quads of all cells. Where the mesh has no room for a cut, nodes move apart before another try;
+/// the cells that could not be cut.
+///
+/// # Errors
+/// The run was interrupted.
+pub fn polygonise(layout: &mut Layout<'_>, watch: &Watch) -> Result<Vec<u32>, Cancelled> {
+    /// What three rounds do not free is too narrow.
+    const ROUNDS: usize = 3;
+    let mut stuck = layout.make_polygons();
+    for _ in 0..ROUNDS {
+        if stuck.is_empty() {
+            break;
+        }
+        layout.relax(1, watch)?;
+        stuck = layout.make_polygons();
+    }
+    Ok(stuck)
+}
+
+/// Optimises a layout of triangles and quads.
+///
+/// # Errors
+/// The run was interrupted.
+pub fn optimise(layout: &mut Layout<'_>, watch: &Watch) -> Result<OptimiseReport, Cancelled> {
+    /// Later rounds hardly find anything.
+    const ROUNDS: usize = 10;
+    let mut report = OptimiseReport::default();
+    layout.relax(1, watch)?;
+    for _ in 0..ROUNDS {
+        let before = report;
+        watch.check()?;
+        triangles::remove(layout, &mut report, watch)?;
+        report.edits += local::improve(layout, watch)?;
+        report.cavities += cavity::improve(layout, watch)?;
+        layout.relax(1, watch)?;
+        if report == before {
+            break;
+        }
+    }
+    layout.relax(2, watch)?;
+    Ok(report)
+}

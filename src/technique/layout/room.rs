@@ -1,0 +1,98 @@
+//! Makes room for a path where the mesh has none: the borders of a cell move off the vertices that the path needs.
+
+use super::Layout;
+use super::finder::{Terrain, along};
+use crate::mesh::{FaceId, VertexId};
+
+/// How many borders may move, one making room for the other.
+const DEPTH: usize = 3;
+
+impl Layout<'_> {
+    /// Finds a path that may run over the border of its cell, and takes the faces round such vertices from the
+    /// neighbours; those faces with their old cells. The neighbours keep their corners.
+    pub(super) fn make_room(&mut self, cell: u32, [from, to]: [VertexId; 2], taken: &[VertexId]) -> Vec<(FaceId, u32)> {
+        let mut finder = std::mem::take(&mut self.finder);
+        let domain = self.faces[cell as usize].first().map_or(0, |&f| self.ground.domain[f]);
+        let usable = |v: VertexId| {
+            let mut faces = self.ground.faces_at.of(v).iter();
+            let near = faces.clone().any(|&f| self.cell[f] == cell);
+            let fits = near && faces.all(|&f| self.ground.domain[f] == domain);
+            fits && !self.node[v] && !self.ground.on_rim[v] && !taken.contains(&v)
+        };
+        let open = |a: FaceId, b: FaceId| self.cell[a] == cell || self.cell[b] == cell;
+        let (a, b) = (self.ground.point(from), self.ground.point(to));
+        let cost = along(a, b);
+        let limit = 20.0 * a.distance(b);
+        let terrain = Terrain { free: &usable, open: &open, cost: &cost, limit };
+        let path = finder.path(self.ground, &[from], |v| v == to, &terrain).unwrap_or_default();
+        self.finder = finder;
+        let mut moved = Vec::new();
+        for &x in path.iter().filter(|&&x| x != from && x != to) {
+            if !self.is_inside(x, cell) {
+                self.absorb(cell, x, DEPTH, &mut moved);
+            }
+        }
+        moved
+    }
+
+    /// Takes the faces round `x`; where the neighbour is too narrow, that one takes from its own neighbour before.
+    fn absorb(&mut self, cell: u32, x: VertexId, depth: usize, moved: &mut Vec<(FaceId, u32)>) -> Option<()> {
+        let faces = self.ground.faces_at.of(x);
+        let own = faces.iter().find(|&&f| self.cell[f] == cell)?;
+        let other = faces.iter().map(|&f| self.cell[f]).find(|&c| c != cell)?;
+        let domain = self.ground.domain[*own];
+        let fits = |&f: &FaceId| (self.cell[f] == cell || self.cell[f] == other) && self.ground.domain[f] == domain;
+        if self.node[x] || self.ground.on_rim[x] || !faces.iter().all(fits) {
+            return None;
+        }
+        let fan: Vec<FaceId> = faces.iter().copied().filter(|&f| self.cell[f] == other).collect();
+        if self.faces[other as usize].len() <= fan.len() + 1 {
+            return None;
+        }
+        let corners = || fan.iter().flat_map(|&f| self.ground.surface.faces[f]);
+        // Vertices between the ends of the fan come once in two faces; the ends come once each.
+        let is_end = |v: VertexId| corners().filter(|&w| w == v).count() == 1;
+        for v in corners().filter(|&v| v != x && !is_end(v)).collect::<Vec<_>>() {
+            if !self.is_inside(v, other) && (depth == 0 || self.absorb(other, v, depth - 1, moved).is_none()) {
+                return None;
+            }
+        }
+        // What was taken for the neighbour may have changed the fan.
+        let unchanged = fan.iter().all(|&f| self.cell[f] == other)
+            && faces.iter().all(|f| self.cell[*f] == cell || fan.contains(f));
+        if !unchanged {
+            return None;
+        }
+        self.faces[other as usize].retain(|f| !fan.contains(f));
+        for &f in &fan {
+            self.cell[f] = cell;
+        }
+        self.faces[cell as usize].extend(&fan);
+        if !self.retrace(other) {
+            for &f in &fan {
+                self.cell[f] = other;
+            }
+            self.faces[cell as usize].retain(|f| !fan.contains(f));
+            self.faces[other as usize].extend(&fan);
+            self.retrace(other);
+            return None;
+        }
+        moved.extend(fan.into_iter().map(|f| (f, other)));
+        Some(())
+    }
+
+    /// Walks round a cell again after its border moved; whether it is still a disk with the same number of corners.
+    pub(super) fn retrace(&mut self, cell: u32) -> bool {
+        let before = self.rings[cell as usize].len();
+        if before == 0 {
+            return true;
+        }
+        let ring = self.trace(cell);
+        let holds = ring.as_ref().is_some_and(|ring| ring.len() == before);
+        if let Some(ring) = ring {
+            self.clear_ring(cell);
+            self.set_ring(cell, ring);
+        }
+        holds
+    }
+}

@@ -1,0 +1,121 @@
+//! The elements of a quad mesh on their surface: common paths as arcs, and the vertices that each element covers.
+
+use rustc_hash::FxHashMap;
+
+use crate::mesh::carried::{EdgeKey, edge_key};
+use crate::mesh::{Cover, FaceId, IdVec, MarkCause, Quads, Surface, VertexId};
+use crate::technique::layout::{Ground, Layout};
+
+/// Why quads and a surface do not belong together.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum FrameError {
+    /// The quads do not say what they cover.
+    #[error("the quads do not say which faces they cover")]
+    NoCover,
+    /// They were made of another surface.
+    #[error("the quads were made of another surface than the one given")]
+    OtherSurface,
+    /// What an element covers is no disk with its corners on the rim.
+    #[error("what element {element} covers is no disk with its corners on the rim")]
+    NotADisk {
+        /// The element.
+        element: usize,
+    },
+}
+
+/// A path between two nodes.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Arc {
+    pub(super) path: Vec<VertexId>,
+    /// The elements beside it with the number of their side, the first one running along.
+    pub(super) beside: Vec<(usize, usize)>,
+    /// Whether the mesh is smooth across.
+    pub(super) is_smooth: bool,
+}
+
+/// Elements with their arcs.
+pub(super) struct Frame<'g> {
+    pub(super) layout: Layout<'g>,
+    pub(super) arcs: Vec<Arc>,
+    /// For each element and side: the arc, and whether it runs along.
+    pub(super) sides: Vec<Vec<(usize, bool)>>,
+}
+
+/// Finds the paths between the elements.
+///
+/// # Errors
+/// See [`FrameError`].
+pub(super) fn frame<'g>(ground: &'g Ground<'g>, quads: &Quads) -> Result<Frame<'g>, FrameError> {
+    let cover = quads.cover.as_ref().ok_or(FrameError::NoCover)?;
+    let layout = embed(ground, quads, cover)?;
+    let mut arcs: Vec<Arc> = Vec::new();
+    let mut known: FxHashMap<EdgeKey, usize> = FxHashMap::default();
+    let mut sides = Vec::new();
+    for element in 0..quads.mesh.faces.len() {
+        let corners = quads.mesh.faces[FaceId::new(element)].corners();
+        let ring = layout.ring(element as u32);
+        // Sides are numbered from the element's first corner.
+        let first = quads.mesh.points[corners[0]];
+        let start = ring.iter().position(|c| ground.point(c.node) == first).unwrap_or(0);
+        let mut own = Vec::new();
+        for k in 0..ring.len() {
+            let path = layout.path(element as u32, (start + k) % ring.len());
+            let key = path.windows(2).map(|w| edge_key(w[0], w[1])).min().unwrap_or([path[0]; 2]);
+            let next = arcs.len();
+            let arc = *known.entry(key).or_insert(next);
+            if arc == next {
+                let is_smooth = is_smooth(ground, &path);
+                arcs.push(Arc { path: path.clone(), beside: Vec::new(), is_smooth });
+            }
+            arcs[arc].beside.push((element, k));
+            own.push((arc, arcs[arc].path[0] == path[0]));
+        }
+        sides.push(own);
+    }
+    Ok(Frame { layout, arcs, sides })
+}
+
+/// Whether no mark and no border of a domain runs along a path.
+fn is_smooth(ground: &Ground<'_>, path: &[VertexId]) -> bool {
+    let marks = &ground.surface.carried.marks;
+    path.windows(2).all(|w| {
+        let is_marked = marks.get(&edge_key(w[0], w[1])).is_some_and(|m| m.cause != MarkCause::Boundary);
+        let side = ground.side_between(w[0], w[1]).or_else(|| ground.side_between(w[1], w[0]));
+        let beyond = side.and_then(|s| ground.beyond(s).map(|f| (s.face, f)));
+        !is_marked && beyond.is_some_and(|(a, b)| ground.domain[a] == ground.domain[b])
+    })
+}
+
+fn embed<'g>(ground: &'g Ground<'g>, quads: &Quads, cover: &Cover) -> Result<Layout<'g>, FrameError> {
+    let surface: &Surface = ground.surface;
+    let count = quads.mesh.faces.len();
+    if cover.surface != surface.shape_hash() || cover.faces.len() != count {
+        return Err(FrameError::OtherSurface);
+    }
+    let mut cell = IdVec::filled(u32::MAX, surface.faces.len());
+    let mut node = IdVec::filled(false, surface.points.len());
+    for (element, faces) in cover.faces.enumerate() {
+        for &f in faces {
+            if cell.get(f) != Some(&u32::MAX) {
+                return Err(FrameError::OtherSurface);
+            }
+            cell[f] = element.raw();
+        }
+        for corner in quads.mesh.faces[element].corners() {
+            let at = quads.mesh.points[*corner];
+            let own = faces.iter().flat_map(|&f| surface.faces[f]).filter(|&v| surface.points[v] == at);
+            own.for_each(|v| node[v] = true);
+        }
+    }
+    if cell.iter().any(|&c| c == u32::MAX) {
+        return Err(FrameError::OtherSurface);
+    }
+    let fixed = IdVec::filled(false, surface.points.len());
+    let (layout, bad) = Layout::new(ground, cell, count, node, fixed);
+    let wrong = (0..count).find(|&e| {
+        let corners = quads.mesh.faces[FaceId::new(e)].corners().len();
+        layout.ring(e as u32).len() != corners
+    });
+    let wrong = bad.first().map(|b| b.cell as usize).or(wrong);
+    wrong.map_or(Ok(layout), |element| Err(FrameError::NotADisk { element }))
+}

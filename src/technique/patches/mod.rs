@@ -1,0 +1,247 @@
+//! Fits bicubic B-spline patches to the faces that the elements of a quad mesh cover.
+//!
+//! The common curves come first, least squares over the path with both ends fixed, so that neighbours share them; then
+//! the control points inside, least squares over the covered vertices with a thin-plate term, whose parameters are then
+//! corrected to the feet of the vertices and the fit repeated. A patch farther from its vertices than the tolerance gets
+//! twice the spans. Patches meet in common curves; the angle between their tangent planes is measured, not enforced.
+//!
+//! Based on: M. Eck, H. Hoppe. Automatic Reconstruction of B-Spline Surfaces of Arbitrary Topological Type. SIGGRAPH,
+//! 1996; J. Hoschek. Intrinsic Parametrization for Approximation. CAGD 5, 1988.
+
+mod flatten;
+mod frame;
+pub mod sample;
+pub mod solve;
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use crate::mesh::bvh::TriangleBvh;
+use crate::mesh::patches::{Patch, Patches, Seam};
+use crate::mesh::{Quads, Soup, Surface};
+use crate::technique::layout::Ground;
+use crate::watch::{Cancelled, Watch};
+pub use frame::FrameError;
+use frame::{Frame, frame};
+use solve::{Curve, fit_curve, fit_inside};
+
+/// How patches are fitted.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FitRules {
+    /// Patches farther from their vertices are refined; mesh units.
+    pub tolerance: f64,
+    /// Most spans in each direction.
+    pub max_spans: usize,
+    /// Weight of the thin-plate term against the samples.
+    pub fairness: f64,
+    /// Elements of the tessellation along each side of a patch.
+    pub density: usize,
+}
+
+/// Why nothing was fitted.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum FitError {
+    /// See [`FrameError`].
+    #[error(transparent)]
+    Frame(#[from] FrameError),
+    /// The run was interrupted.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+}
+
+/// An element on its way to a patch.
+struct Fit {
+    spans: usize,
+    points: Vec<DVec3>,
+    places: Vec<[f64; 2]>,
+    patch: Patch,
+}
+
+/// Fits patches to the faces that each element covers.
+///
+/// # Errors
+/// See [`FitError`].
+pub fn fit_patches(surface: &Surface, quads: &Quads, rules: &FitRules, watch: &Watch) -> Result<Patches, FitError> {
+    let ground = Ground::new(surface);
+    let frame = frame(&ground, quads)?;
+    let mut spans = vec![1; frame.sides.len()];
+    watch.phase("fit", None);
+    let mut fits: Vec<Fit> = (0..frame.sides.len()).into_par_iter().map(|e| begin(&frame, e)).collect();
+    loop {
+        watch.check()?;
+        let curves = curves(&frame, &spans, rules);
+        fits.par_iter_mut().enumerate().for_each(|(e, fit)| fit.solve(&frame, e, spans[e], &curves, rules));
+        let errors = errors(&frame, &fits);
+        watch.check()?;
+        let mut refined = false;
+        for (e, error) in errors.iter().enumerate() {
+            fits[e].patch.max_error = error.0;
+            fits[e].patch.rms_error = error.1;
+            // With fewer than two vertices for each control point the fit would follow the triangles and swing between.
+            let unknown = (2 * spans[e] + 1) * (2 * spans[e] + 1);
+            if error.0 > rules.tolerance && 2 * spans[e] <= rules.max_spans && 2 * unknown <= fits[e].points.len() {
+                spans[e] *= 2;
+                refined = true;
+            }
+        }
+        if !refined {
+            break;
+        }
+    }
+    let seams = seams(&frame, &fits);
+    let patches: Vec<Patch> = fits.into_iter().map(|fit| fit.patch).collect();
+    let tessellation = sample::tessellate(&frame, &patches, rules.density);
+    Ok(Patches { patches, seams, tessellation })
+}
+
+fn begin(frame: &Frame<'_>, element: usize) -> Fit {
+    let (inside, places) = flatten::flatten(frame, element);
+    let points = inside.iter().map(|&v| frame.layout.ground.point(v)).collect();
+    Fit { spans: 0, points, places, patch: Patch::default() }
+}
+
+/// The curves of all arcs, each with the spans of the finer element beside it.
+fn curves(frame: &Frame<'_>, spans: &[usize], rules: &FitRules) -> Vec<Curve> {
+    let ground = frame.layout.ground;
+    let fit = |arc: &frame::Arc| {
+        let wanted = arc.beside.iter().map(|&(e, _)| spans[e]).max().unwrap_or(1);
+        let mut points: Vec<DVec3> = arc.path.iter().map(|&v| ground.point(v)).collect();
+        let mut count = 1;
+        // A curve cannot say more than its path; spans stay powers of two times the least, so that knots are nested.
+        while count < wanted && 2 * count < points.len() {
+            count *= 2;
+        }
+        if points.len() == 2 {
+            points.insert(1, points[0].midpoint(points[1]));
+        }
+        fit_curve(&points, count.min(wanted).min(rules.max_spans))
+    };
+    frame.arcs.par_iter().map(fit).collect()
+}
+
+impl Fit {
+    /// Fits the inside under the curves given, and corrects the parameters.
+    fn solve(&mut self, frame: &Frame<'_>, element: usize, spans: usize, curves: &[Curve], rules: &FitRules) {
+        /// Rounds of parameter correction; later ones change little.
+        const ROUNDS: usize = 3;
+        let sides = &frame.sides[element];
+        // The finest of its curves decides, so that each is reproduced exactly.
+        let most = sides.iter().map(|&(arc, _)| curves[arc].spans).max().unwrap_or(1).max(spans);
+        self.spans = most;
+        let border: Vec<Vec<DVec3>> = sides
+            .iter()
+            .map(|&(arc, is_along)| {
+                let mut controls = curves[arc].refined(most).controls;
+                if !is_along {
+                    controls.reverse();
+                }
+                controls
+            })
+            .collect();
+        self.patch = with_border(most, &border);
+        for _ in 0..ROUNDS {
+            fit_inside(&mut self.patch, &self.points, &self.places, rules.fairness);
+            self.correct();
+        }
+        fit_inside(&mut self.patch, &self.points, &self.places, rules.fairness);
+    }
+
+    fn correct(&mut self) {
+        for (place, &p) in self.places.iter_mut().zip(&self.points) {
+            *place = self.patch.foot(p, *place);
+        }
+    }
+}
+
+/// A patch with these sides, counter-clockwise, its inside a Coons patch of the control points.
+fn with_border(spans: usize, sides: &[Vec<DVec3>]) -> Patch {
+    let n = spans + 3;
+    let is_triangle = sides.len() == 3;
+    let mut patch = Patch { spans: [spans; 2], controls: vec![DVec3::ZERO; n * n], is_triangle, ..Patch::default() };
+    let apex = sides[sides.len() - 1][0];
+    let top = |i: usize| if is_triangle { apex } else { sides[2][n - 1 - i] };
+    let left = |j: usize| sides[sides.len() - 1][n - 1 - j];
+    let (bottom, right) = (|i: usize| sides[0][i], |j: usize| sides[1][j]);
+    for j in 0..n {
+        for i in 0..n {
+            let (u, v) = (i as f64 / (n - 1) as f64, j as f64 / (n - 1) as f64);
+            let ruled = bottom(i) * (1.0 - v) + top(i) * v + left(j) * (1.0 - u) + right(j) * u;
+            let corners = bottom(0).lerp(bottom(n - 1), u) * (1.0 - v) + top(0).lerp(top(n - 1), u) * v;
+            patch.controls[j * n + i] = match (i, j) {
+                (_, 0) => bottom(i),
+                (_, _) if j == n - 1 => top(i),
+                (0, _) => left(j),
+                (_, _) if i == n - 1 => right(j),
+                _ => ruled - corners,
+            };
+        }
+    }
+    patch
+}
+
+/// Where a side runs on a patch: the place at `t` along the side.
+fn on_side(side: usize, count: usize, t: f64) -> [f64; 2] {
+    match (side, count) {
+        (0, _) => [t, 0.0],
+        (1, _) => [1.0, t],
+        (2, 4) => [1.0 - t, 1.0],
+        _ => [0.0, 1.0 - t],
+    }
+}
+
+fn normal(patch: &Patch, [u, v]: [f64; 2]) -> DVec3 {
+    let [_, su, sv] = patch.eval(u, v);
+    su.cross(sv).normalize_or_zero()
+}
+
+/// Places of both patches beside an arc at a share of its length.
+fn at_seam(frame: &Frame<'_>, arc: usize, t: f64) -> Option<[(usize, [f64; 2]); 2]> {
+    let [first, second] = frame.arcs[arc].beside[..] else { return None };
+    let place = |(e, side): (usize, usize)| {
+        let (_, is_along) = frame.sides[e][side];
+        (e, on_side(side, frame.sides[e].len(), if is_along { t } else { 1.0 - t }))
+    };
+    Some([place(first), place(second)])
+}
+
+/// Largest and root mean square distance of each element's vertices from all patches together.
+fn errors(frame: &Frame<'_>, fits: &[Fit]) -> Vec<(f64, f64)> {
+    /// Elements of the mesh for distances along a side of a patch.
+    const FINE: usize = 16;
+    let patches: Vec<Patch> = fits.iter().map(|fit| fit.patch.clone()).collect();
+    let fine: Soup = sample::tessellate(frame, &patches, FINE);
+    let tree = TriangleBvh::of_surface(&sample::triangles(&fine));
+    let ground = frame.layout.ground;
+    let of_element = |(e, fit): (usize, &Fit)| {
+        let own = fit.points.iter().zip(&fit.places).map(|(&p, &place)| {
+            let [u, v] = fit.patch.foot(p, place);
+            let own = fit.patch.point(u, v).distance(p);
+            tree.closest_within(p, own * own).map_or(own, |near| near.distance().min(own))
+        });
+        let rim = frame.sides[e].iter().flat_map(|&(arc, _)| &frame.arcs[arc].path);
+        let rim = rim.map(|&v| tree.closest(ground.point(v)).map_or(0.0, |near| near.distance()));
+        let all: Vec<f64> = own.chain(rim).collect();
+        (all.iter().copied().fold(0.0, f64::max), crate::metric::summary::rms(&all).unwrap_or(0.0))
+    };
+    fits.par_iter().enumerate().map(of_element).collect()
+}
+
+/// The angle between the tangent planes along each inner arc.
+fn seams(frame: &Frame<'_>, fits: &[Fit]) -> Vec<Seam> {
+    /// Places along a seam where the planes are compared; the ends are common to more than two patches.
+    const PLACES: usize = 16;
+    let seam = |arc: usize| {
+        let mut angle = 0.0_f64;
+        let mut pair = None;
+        for k in 1..PLACES {
+            let [a, b] = at_seam(frame, arc, k as f64 / PLACES as f64)?;
+            let normals = [a, b].map(|(e, uv)| normal(&fits[e].patch, uv));
+            // Planes have no sides: at a corner of nearly 180 degrees the order of the derivatives may swap.
+            let between = crate::mesh::geometry::angle(normals[0], normals[1]).to_degrees();
+            angle = angle.max(between.min(180.0 - between));
+            pair = Some([a.0 as u32, b.0 as u32]);
+        }
+        pair.map(|patches| Seam { patches, angle, is_smooth: frame.arcs[arc].is_smooth })
+    };
+    (0..frame.arcs.len()).filter_map(seam).collect()
+}
