@@ -8,10 +8,10 @@ use meshmill::mesh::{
 };
 use meshmill::step::{Length, Sizing};
 use meshmill::steps::control_properties::{
-    ControlPropertiesInput, ControlPropertiesParams, ControlPropertiesStats, Status, control_properties,
+    ControlPropertiesInput, ControlPropertiesParams, ControlPropertiesStats, OnInfeasible, Status, control_properties,
 };
 use meshmill::steps::improve_quality::{ImproveQualityInput, ImproveQualityParams, improve_quality};
-use meshmill::technique::collapse::session::ToleranceMode;
+use meshmill::technique::collapse::session::{Cause, ToleranceMode};
 use meshmill::watch::Watch;
 
 fn surface(points: Vec<DVec3>, faces: &[[usize; 3]]) -> Surface {
@@ -242,6 +242,30 @@ fn corners_closer_than_the_curves_tolerance_become_one() {
     assert_eq!(euler(&result), 2);
     let strict = ControlPropertiesParams { feature_tolerance: Some(Length::Absolute(1e-4)), ..tolerance(0.01) };
     assert!(has_both(&control(&dense, &strict).0), "the curves' tolerance forbids it");
+}
+
+#[test]
+fn what_cannot_be_reached_is_reported_or_refused() {
+    // Rims that meet at less than three degrees leave no good triangle in the corner.
+    let sharp = surface(vec![DVec3::ZERO, dvec3(10.0, 0.0, 0.0), dvec3(10.0, 0.5, 0.0)], &[[0, 1, 2]]);
+    let sharp = meshmill::technique::refine::subdivide(&sharp, 4, 1_000_000, &LockRules::default(), &Watch::silent())
+        .unwrap()
+        .0;
+    let (_, stats) = control(&sharp, &tolerance(0.01));
+    assert_eq!(stats.status, Status::Stuck);
+    assert!(stats.violations.iter().any(|v| matches!(v.cause, Cause::CurvesMeet { degrees } if degrees < 3.0)));
+    let strict = ControlPropertiesParams { on_infeasible: OnInfeasible::Error, ..tolerance(0.01) };
+    let input = ControlPropertiesInput { surface: &sharp, reference: &sharp, locks: LockRules::default() };
+    let refusal = control_properties(input, &strict, &Watch::silent()).expect_err("a threshold does not hold");
+    assert!(refusal.to_string().contains("marked curves meet there at 2.86 degrees"), "{refusal}");
+    assert!(
+        control_properties(
+            ControlPropertiesInput { surface: &grid(4), reference: &grid(4), ..input },
+            &strict,
+            &Watch::silent()
+        )
+        .is_ok()
+    );
 }
 
 #[test]

@@ -35,7 +35,7 @@ use crate::step::{
     Artifact, InputDef, Inputs, Length, Locks, OutPort, OutputDef, Port, Produced, ResolvedSizing, Sizing, StepFailure,
 };
 use crate::technique::collapse::session::{
-    Recount, Setup, ToleranceMode, Violation, diagonal, open, recount, reference_tree,
+    Cause, Recount, Setup, Threshold, ToleranceMode, Violation, diagonal, open, recount, reference_tree,
 };
 use crate::technique::collapse::{CollapseRules, Counts, Editor, Ending, Limits, Order, Priority, SizeField, simplify};
 use crate::technique::hierarchy::{Front, extract};
@@ -77,6 +77,20 @@ pub struct ControlPropertiesParams {
     /// the pure collapse of the papers.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub optimize: Option<bool>,
+    /// What happens where a threshold cannot be reached: `"report"` names the faces in the statistics, `"error"` lets the
+    /// step fail. Default `"report"`.
+    pub on_infeasible: OnInfeasible,
+}
+
+/// What happens where thresholds cannot be reached.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum OnInfeasible {
+    /// The statistics name the faces, the cause, and what was reached.
+    #[default]
+    Report,
+    /// The step fails.
+    Error,
 }
 
 impl Default for ControlPropertiesParams {
@@ -91,6 +105,7 @@ impl Default for ControlPropertiesParams {
             target_faces: None,
             feature_weight: 100.0,
             optimize: None,
+            on_infeasible: OnInfeasible::Report,
         }
     }
 }
@@ -172,6 +187,16 @@ pub enum ControlPropertiesError {
         /// What it is.
         value: f64,
     },
+    /// Thresholds do not hold everywhere, and `on-infeasible` asks for an error then.
+    #[error("thresholds break on {faces} faces and {vertices} vertices with too many edges{worst}")]
+    Infeasible {
+        /// Faces that break a threshold.
+        faces: usize,
+        /// Vertices with more edges than allowed.
+        vertices: usize,
+        /// The worst of the faces, with the cause, as text; empty where there is none.
+        worst: String,
+    },
     /// A size names a field or group that is not there.
     #[error("max-size: {0}")]
     Size(StepFailure),
@@ -217,7 +242,36 @@ pub fn control_properties(
     let mut result = editor.into_mesh().leave().surface;
     inherit_fields(input.surface, &mut result);
     let stats = stats(&input, params, &setup, &result, End { ending, counts, distance_bound })?;
+    match params.on_infeasible {
+        OnInfeasible::Error => refuse_violations(&stats)?,
+        OnInfeasible::Report => {}
+    }
     Ok((result, stats))
+}
+
+/// Fails where a threshold does not hold.
+fn refuse_violations(stats: &ControlPropertiesStats) -> Result<(), ControlPropertiesError> {
+    let (faces, vertices) = (stats.faces_violating, stats.vertices_over_valence);
+    if faces == 0 && vertices == 0 {
+        return Ok(());
+    }
+    let shapes = stats.violations.iter().filter(|v| v.threshold == Threshold::MinStretch);
+    let worst = shapes.min_by(|a, b| a.value.total_cmp(&b.value)).or(stats.violations.first());
+    Err(ControlPropertiesError::Infeasible { faces, vertices, worst: worst.map(describe).unwrap_or_default() })
+}
+
+fn describe(violation: &Violation) -> String {
+    let Violation { face, at: [x, y, z], threshold, value, cause } = violation;
+    let threshold = match threshold {
+        Threshold::MinStretch => "a stretch",
+        Threshold::MaxSize => "a longest side",
+    };
+    let cause = match cause {
+        Cause::CurvesMeet { degrees } => format!("marked curves meet there at {degrees:.2} degrees"),
+        Cause::Kept => "its corners are kept".to_owned(),
+        Cause::Stuck => "no edit within the tolerances makes it better".to_owned(),
+    };
+    format!("; the worst is face {face} at ({x}, {y}, {z}) with {threshold} of {value:.4}: {cause}")
 }
 
 /// Mends and optimises `input.surface` as [`control_properties`] does before it simplifies, then records every collapse
@@ -368,6 +422,9 @@ impl From<ControlPropertiesError> for StepFailure {
             ControlPropertiesError::PercentOfSquare => Self::failed(message)
                 .with_help("give a number in squared mesh units, or use `tolerance-mode = \"quadric-rms\"`"),
             ControlPropertiesError::Size(failure) => Self { message, ..failure },
+            ControlPropertiesError::Infeasible { .. } => Self::failed(message).with_help(
+                "relax the threshold, give more tolerance or finer elements, or use `on-infeasible = \"report\"`",
+            ),
             ControlPropertiesError::NotASurface(_) => Self::bad_input(message).with_help("run `repair` first"),
             ControlPropertiesError::OutOfRange { .. } | ControlPropertiesError::Locks(_) => Self::failed(message),
         }

@@ -10,6 +10,7 @@ use glam::DVec3;
 use smallvec::SmallVec;
 
 use super::edit::{Done, Edit};
+use super::raise::reachable;
 use crate::mesh::geometry::{area_vector, closest_on_triangle, stretch, triangle_size};
 use crate::mesh::halfedge::{HalfedgeMesh, edge_of};
 use crate::mesh::{EdgeMark, FaceId, Freedom, LockRules, MarkCause, Rim, Surface, VertexId, edge_key, resolve_freedom};
@@ -49,7 +50,7 @@ pub(super) struct Trial {
     edits: SmallVec<[(Edit, Done); 4]>,
     /// Planes and lines by vertex; empty where the tolerance is a certified distance.
     quadrics: Vec<[Quadric; 2]>,
-    /// What the faces lack to the threshold: the sum of squares, as shares of the threshold.
+    /// What the faces lack to what they can reach: the sum of squares of the shares.
     pub(super) shortfall: f64,
 }
 
@@ -103,16 +104,20 @@ impl Cavity {
         self.core.get(f.index()).copied().unwrap_or(true)
     }
 
-    /// The core faces below the threshold, worst first.
+    /// The core faces below what they can reach, worst first.
     pub(super) fn worst(&self, mesh: &HalfedgeMesh) -> Vec<FaceId> {
         let rated = mesh.faces().filter(|&f| self.is_core(f)).map(|f| (stretch(mesh.corner_points(f)), f));
-        let mut bad: Vec<(f64, FaceId)> = rated.filter(|(shape, _)| *shape < self.threshold).collect();
+        let is_bad = |&(shape, f): &(f64, FaceId)| shape < self.threshold && shape < reachable(mesh, f, self.threshold);
+        let mut bad: Vec<(f64, FaceId)> = rated.filter(is_bad).collect();
         bad.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         bad.into_iter().map(|(_, f)| f).collect()
     }
 
     fn shortfall(&self, mesh: &HalfedgeMesh) -> f64 {
-        let lack = |f| (1.0 - stretch(mesh.corner_points(f)) / self.threshold).max(0.0);
+        let lack = |f| {
+            let shape = stretch(mesh.corner_points(f));
+            if shape >= self.threshold { 0.0 } else { (1.0 - shape / reachable(mesh, f, self.threshold)).max(0.0) }
+        };
         mesh.faces().filter(|&f| self.is_core(f)).map(|f| lack(f).powi(2)).sum()
     }
 

@@ -13,7 +13,7 @@ use glam::DVec3;
 use super::search::mend_by_search;
 use super::{Gain, relax};
 use crate::mesh::geometry::{angle, area_vector, stretch};
-use crate::mesh::halfedge::edge_of;
+use crate::mesh::halfedge::{HalfedgeMesh, edge_of};
 use crate::mesh::{EdgeId, FaceId, Freedom, VertexId};
 use crate::technique::collapse::session::best_stretch_at;
 use crate::technique::collapse::{CollapseRules, Editor};
@@ -30,6 +30,9 @@ const MOST_SEARCHED: usize = 400;
 
 /// A face this near to the best that its corner between two curves allows is left alone.
 const NEAR_BEST: f64 = 0.95;
+
+/// Radians below which the angle between two curves may be what limits a face.
+const SHARP: f64 = 0.5;
 
 /// Raises the stretch of the faces below `threshold`, worst first, and where no single edit helps by a search for
 /// several. Returns how many are left.
@@ -90,7 +93,8 @@ fn search(
     let mut gained = false;
     for f in faces_below(editor, threshold).into_iter().take(MOST_SEARCHED) {
         watch.check()?;
-        let is_open = editor.mesh().face_is_live(f) && editor.stretch(f) < threshold && !is_near_best(editor, f);
+        let mesh = editor.mesh();
+        let is_open = mesh.face_is_live(f) && editor.stretch(f) < reachable(mesh, f, threshold);
         if !is_open || failed.get(&f) == Some(&age(editor, f)) {
             continue;
         }
@@ -110,17 +114,24 @@ fn age(editor: &Editor<'_>, f: FaceId) -> u64 {
     around.map(|v| u64::from(mesh.version(v))).sum()
 }
 
-/// Whether curves meet in a corner of the face so sharply that it is about as good as it can be.
-fn is_near_best(editor: &Editor<'_>, f: FaceId) -> bool {
-    let mesh = editor.mesh();
+/// The stretch a face should reach: `threshold`, or where curves meet in one of its corners too sharply for that, nearly
+/// the best that the corner allows.
+pub(super) fn reachable(mesh: &HalfedgeMesh, f: FaceId, threshold: f64) -> f64 {
     let first = mesh.face_halfedge(f);
-    [first, mesh.next(first), mesh.prev(first)].into_iter().any(|h| {
-        let is_curve = |h| mesh.edge_freedom(edge_of(h)) != Freedom::Free;
-        let at = mesh.point(mesh.origin(h));
-        let opening = angle(mesh.point(mesh.target(h)) - at, mesh.point(mesh.origin(mesh.prev(h))) - at);
-        let is_wedge = is_curve(h) && is_curve(mesh.prev(h)) && opening < 0.5;
-        is_wedge && editor.stretch(f) >= NEAR_BEST * best_stretch_at(opening)
-    })
+    let sides = [first, mesh.next(first), mesh.prev(first)];
+    let is_curve = sides.map(|h| mesh.edge_freedom(edge_of(h)) != Freedom::Free);
+    let corners = sides.map(|h| mesh.point(mesh.origin(h)));
+    let mut target = threshold;
+    for at in 0..3 {
+        let (next, before) = ((at + 1) % 3, (at + 2) % 3);
+        if is_curve[at] && is_curve[before] {
+            let opening = angle(corners[next] - corners[at], corners[before] - corners[at]);
+            if opening < SHARP {
+                target = target.min(NEAR_BEST * best_stretch_at(opening));
+            }
+        }
+    }
+    target
 }
 
 /// The live faces with less stretch, worst first.
