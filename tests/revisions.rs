@@ -56,6 +56,7 @@ const CASES: &[(&str, &str, &str)] = &[
     ("rough-quads", "interval = 0.2, thickness = { strips = 4 }, optimize = false", ""),
     ("fit-patches", "tolerance = \"0.1%\", density = 3", ""),
     ("fit-patches", "max-spans = 2", ""),
+    ("q-morph", "size = \"9%\"", ""),
     ("measure", "", ""),
 ];
 

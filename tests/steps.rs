@@ -21,6 +21,7 @@ mod steps {
     mod improve_quality;
     mod measure;
     mod partition;
+    mod q_morph;
     mod read;
     mod refine;
     mod remove_features;

@@ -9,6 +9,7 @@ pub mod fit_patches;
 pub mod improve_quality;
 pub mod measure;
 pub mod partition;
+pub mod q_morph;
 pub mod read;
 pub mod refine;
 pub mod remove_features;
@@ -42,5 +43,6 @@ pub static CATALOG: &[StepDef] = &[
     StepDef::of::<split::Step>(),
     StepDef::of::<rough_quads::Step>(),
     StepDef::of::<fit_patches::Step>(),
+    StepDef::of::<q_morph::Step>(),
     StepDef::of::<measure::Step>(),
 ];

@@ -2,18 +2,25 @@
 
 pub mod arcs;
 pub mod belts;
+pub mod clean_quads;
 pub mod collapse;
 pub mod curvature;
 pub mod decimate;
 pub mod defeature;
 pub mod eigen;
 pub mod feature;
+pub mod front;
+pub mod ground;
 pub mod halve_edges;
 pub mod heap;
 pub mod hierarchy;
 pub mod layout;
 pub mod levels;
 pub mod patches;
+pub mod isotropic;
+pub mod join;
+pub mod levels;
+pub mod mixed;
 pub mod quadric;
 pub mod refine;
 pub mod remesh;

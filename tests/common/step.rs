@@ -43,6 +43,14 @@ pub(crate) fn check(artifact: &Artifact, what: &str) {
         Artifact::Surface(surface) => assert_eq!(validate_surface(surface), [], "{what}"),
         // A soup may be any polygon soup, but its numbers must fit.
         Artifact::Soup(soup) => assert!(soup.points.iter().all(|p| p.is_finite()), "{what}: {:?}", validate_soup(soup)),
+        Artifact::Quads(quads) => {
+            let mesh = &quads.mesh;
+            let edges = meshmill::mesh::topology::EdgeTable::new(mesh);
+            assert!(mesh.points.iter().all(|p| p.is_finite()), "{what}: a coordinate is not finite");
+            assert!(edges.iter().all(|(_, _, sides)| sides.len() <= 2), "{what}: an edge has more than two faces");
+            let alike = |sides: &[meshmill::mesh::topology::SideRef]| sides[0].is_forward == sides[1].is_forward;
+            assert!(!edges.iter().any(|(_, _, s)| s.len() == 2 && alike(s)), "{what}: faces turn against each other");
+        }
         _ => {}
     }
 }

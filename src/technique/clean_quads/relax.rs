@@ -1,0 +1,229 @@
+//! Moving vertices: quick smoothing while the topology changes, and the search for better shapes at the end.
+
+use glam::DVec3;
+use smallvec::SmallVec;
+
+use super::Cleaner;
+use crate::technique::mixed::{Place, quad_quality, triangle_quality};
+use crate::watch::{Cancelled, Watch};
+
+/// The other corners of the faces at a vertex, and which corner the vertex is: what a move changes.
+struct Star {
+    faces: SmallVec<[([DVec3; 4], u8, u8); 8]>,
+    normal: DVec3,
+}
+
+impl Star {
+    /// The cost of the faces with the vertex at `p`: 0 where all are squares; steep below useful shapes.
+    fn cost(&self, p: DVec3) -> f64 {
+        let mut sum = 0.0;
+        for &(mut corners, at, n) in &self.faces {
+            corners[at as usize] = p;
+            let q = if n == 4 { quad_quality(corners) } else { triangle_quality([corners[0], corners[1], corners[2]]) };
+            let lack = 1.0 - q;
+            let poor = (0.7 - q).max(0.0);
+            let bad = (0.3 - q).max(0.0);
+            sum += lack * lack + 8.0 * poor * poor + 60.0 * bad * bad;
+            if self.normal != DVec3::ZERO {
+                let last = if n == 4 { corners[3] } else { corners[2] };
+                let face = (corners[2] - corners[0]).cross(last - corners[1]);
+                if n == 4 && face.dot(self.normal) < 0.2 * face.length() {
+                    sum += 20.0;
+                }
+            }
+        }
+        sum
+    }
+}
+
+impl Cleaner<'_, '_> {
+    fn star(&self, v: u32, normal: DVec3) -> Star {
+        let mut star = Star { faces: SmallVec::new(), normal };
+        for f in self.mesh.faces_at(v) {
+            let corners = self.mesh.corners(f);
+            let mut points = [DVec3::ZERO; 4];
+            let mut at = 0;
+            for (i, &w) in corners.iter().enumerate() {
+                points[i] = self.mesh.point(w);
+                if w == v {
+                    at = i as u8;
+                }
+            }
+            star.faces.push((points, at, corners.len() as u8));
+        }
+        star
+    }
+
+    /// The least quality at a vertex; a face turned against the surface counts as inverted.
+    pub(super) fn sound_quality(&self, v: u32) -> f64 {
+        let mut least = f64::INFINITY;
+        for f in self.mesh.faces_at(v) {
+            let mut reference = DVec3::ZERO;
+            for h in self.mesh.sides(f) {
+                let w = self.mesh.origin(h);
+                if self.mesh.place(w).is_free() {
+                    reference += self.mesh.normal(w);
+                }
+            }
+            let turned = self.mesh.face_normal(f).dot(reference.normalize_or_zero()) < 0.2 && reference != DVec3::ZERO;
+            least = least.min(if turned { -1.0 } else { self.mesh.quality(f) });
+        }
+        least
+    }
+
+    /// Whether a normal is one of the same side of the body as the vertex is on.
+    fn is_near(&self, v: u32, normal: DVec3) -> bool {
+        let now = self.mesh.normal(v);
+        now == DVec3::ZERO || normal.dot(now) >= 0.5
+    }
+
+    /// Puts a vertex that another one was drawn into between its neighbours.
+    pub(super) fn centre_between(&mut self, v: u32) {
+        if let Place::Region(region) = self.mesh.place(v) {
+            let (mut sum, mut n) = (DVec3::ZERO, 0.0);
+            for w in self.mesh.neighbours(v) {
+                sum += self.mesh.point(w);
+                n += 1.0;
+            }
+            let foot = self.ground.project(region, sum / n);
+            if self.is_near(v, foot.normal) {
+                self.mesh.set_point(v, foot.point, foot.normal);
+            }
+        }
+    }
+
+    /// Rounds of plain smoothing of the free ones of these vertices; moves are kept if the faces get no worse.
+    pub(super) fn relax(&mut self, vertices: &[u32], rounds: usize) {
+        for _ in 0..rounds {
+            for &v in vertices {
+                if let Place::Region(region) = self.mesh.place(v) {
+                    let (mut sum, mut weight) = (DVec3::ZERO, 0.0);
+                    for h in self.mesh.star(v) {
+                        let far = self.mesh.target(self.mesh.next(h));
+                        sum += self.mesh.point(self.mesh.target(h)) + 0.25 * self.mesh.point(far);
+                        weight += 1.25;
+                    }
+                    let now = self.mesh.point(v);
+                    let star = self.star(v, self.mesh.normal(v));
+                    let foot = self.ground.project(region, sum / weight);
+                    if self.is_near(v, foot.normal) && star.cost(foot.point) < star.cost(now) {
+                        self.mesh.set_point(v, foot.point, foot.normal);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Smoothing of all vertices.
+    pub(super) fn relax_all(&mut self, rounds: usize) {
+        let all: Vec<u32> = self.mesh.vertices().collect();
+        self.relax(&all, rounds);
+    }
+
+    /// Moves every vertex where its faces are better, until the moves are small. Returns the rounds.
+    pub(super) fn optimise(&mut self, rounds: usize, watch: &Watch) -> Result<usize, Cancelled> {
+        let all: Vec<u32> = self.mesh.vertices().collect();
+        let mut active: Vec<bool> = vec![true; self.mesh.vertex_slots() as usize];
+        for round in 0..rounds {
+            watch.check()?;
+            let mut moved = 0;
+            for &v in &all {
+                if !std::mem::replace(&mut active[v as usize], false) {
+                    continue;
+                }
+                let changed = match self.mesh.place(v) {
+                    Place::Node => false,
+                    Place::Arc { arc, at } => self.slide(v, arc, at),
+                    Place::Region(region) => self.search(v, region),
+                };
+                if changed {
+                    moved += 1;
+                    active[v as usize] = true;
+                    for f in self.mesh.faces_at(v) {
+                        for h in self.mesh.sides(f) {
+                            active[self.mesh.origin(h) as usize] = true;
+                        }
+                    }
+                }
+            }
+            if moved * 200 < all.len() {
+                return Ok(round + 1);
+            }
+        }
+        Ok(rounds)
+    }
+
+    /// The mean length of the edges at a vertex.
+    fn reach(&self, v: u32) -> f64 {
+        let (mut sum, mut n) = (0.0, 0.0);
+        for h in self.mesh.star(v) {
+            sum += self.mesh.length(h);
+            n += 1.0;
+        }
+        sum / n
+    }
+
+    /// A pattern search in the tangent plane, back onto the region.
+    fn search(&mut self, v: u32, region: u32) -> bool {
+        let normal = self.mesh.normal(v);
+        let star = self.star(v, normal);
+        let start = self.mesh.point(v);
+        let first = star.cost(start);
+        let axis = if normal == DVec3::ZERO { DVec3::Z } else { normal };
+        let x = axis.any_orthonormal_vector();
+        let y = axis.cross(x);
+        let (mut best, mut cost) = (start, first);
+        let reach = self.reach(v);
+        let mut step = 0.12 * reach;
+        while step > 0.01 * reach {
+            let before = cost;
+            for (a, b) in [(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)] {
+                let p = best + step * (a * x + b * y);
+                let c = star.cost(p);
+                if c < cost {
+                    (best, cost) = (p, c);
+                }
+            }
+            if cost >= before - 1e-3 * before {
+                step *= 0.5;
+            }
+        }
+        if first - cost < 1e-4 * first.max(1e-3) {
+            return false;
+        }
+        let foot = self.ground.project(region, best);
+        let sound = star.cost(foot.point) < first && self.is_near(v, foot.normal);
+        if sound {
+            self.mesh.set_point(v, foot.point, foot.normal);
+        }
+        sound
+    }
+
+    /// A search along the curve, between the neighbours there.
+    fn slide(&mut self, v: u32, arc: u32, at: f64) -> bool {
+        let curve = &self.ground.curves[arc as usize];
+        let star = self.star(v, DVec3::ZERO);
+        let first = star.cost(self.mesh.point(v));
+        let reach = self.reach(v);
+        let (mut best, mut cost) = (at, first);
+        let mut step = 0.1 * reach;
+        while step > 0.01 * reach {
+            let before = cost;
+            for p in [best - step, best + step] {
+                let c = star.cost(curve.at(p));
+                if c < cost && p > 0.0 && p < curve.length() && (p - at).abs() < 0.3 * reach {
+                    (best, cost) = (p, c);
+                }
+            }
+            if cost >= before {
+                step *= 0.5;
+            }
+        }
+        if first - cost < 1e-3 * first.max(1e-3) {
+            return false;
+        }
+        self.mesh.set_point(v, curve.at(best), DVec3::ZERO);
+        self.mesh.set_place(v, Place::Arc { arc, at: best });
+        true
+    }
+}

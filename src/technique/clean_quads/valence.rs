@@ -1,0 +1,73 @@
+//! How far valences are from their ideals.
+
+use super::Cleaner;
+use crate::technique::mixed::{Mixed, NONE};
+
+/// Irregular vertices of a mesh.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Census {
+    /// Vertices inside regions or on curves, not on rims.
+    pub inner: usize,
+    /// Of those, the ones with another valence than 4.
+    pub irregular: usize,
+}
+
+/// Counts the inner vertices whose valence is not 4.
+pub fn census(mesh: &Mixed) -> Census {
+    let mut census = Census::default();
+    for v in mesh.vertices() {
+        if mesh.star(v).all(|h| mesh.face(h) != NONE) {
+            census.inner += 1;
+            census.irregular += usize::from(mesh.valence(v) != 4);
+        }
+    }
+    census
+}
+
+/// The quads that fit into an angle, in radians.
+pub(super) fn ideal(angle: f64) -> f64 {
+    (angle / std::f64::consts::FRAC_PI_2).round().max(1.0)
+}
+
+/// What a number of quads in an angle costs: the square of the difference from the ideal, and much where one of them
+/// would be nearly flat.
+pub(super) fn cost(quads: f64, angle: f64) -> f64 {
+    let difference = quads - ideal(angle);
+    let flat = if angle / quads > 2.6 { 20.0 } else { 0.0 };
+    difference * difference * 1.5 + flat
+}
+
+impl Cleaner<'_, '_> {
+    /// The misfit of a vertex: 0 where its valence is ideal.
+    pub(super) fn misfit(&self, v: u32) -> f64 {
+        if self.is_free(v) {
+            let difference = self.mesh.valence(v) as f64 - 4.0;
+            return difference * difference;
+        }
+        // Sectors between curves, each with its quads and its angle; a sector starts after a curve or the border.
+        let star: smallvec::SmallVec<[u32; 16]> = self.mesh.star(v).collect();
+        let bound = |h: u32| self.mesh.arc(h) != NONE || self.mesh.face(h) == NONE || self.mesh.face(h ^ 1) == NONE;
+        let Some(start) = star.iter().position(|&h| bound(h)) else {
+            let difference = star.len() as f64 - 4.0;
+            return difference * difference;
+        };
+        let (mut sum, mut quads, mut angle) = (0.0, 0.0, 0.0);
+        for i in 0..star.len() {
+            let h = star[(start + i) % star.len()];
+            if i > 0 && bound(h) {
+                if quads > 0.0 {
+                    sum += cost(quads, angle);
+                }
+                (quads, angle) = (0.0, 0.0);
+            }
+            if self.mesh.face(h) != NONE {
+                quads += 1.0;
+                angle += self.mesh.corner_angle(h);
+            }
+        }
+        if quads > 0.0 {
+            sum += cost(quads, angle);
+        }
+        sum
+    }
+}

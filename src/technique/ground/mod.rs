@@ -1,0 +1,197 @@
+//! A surface as the ground of another mesh: its curves, the regions between them, and the way back onto both.
+//!
+//! The network of curves is made of all marked edges, all rims, and all edges where the region label changes. It is cut
+//! at nodes: where not exactly two of its edges meet, at kept vertices, and where it turns sharply; a curve without any
+//! gets one. The rest of the surface falls into regions, each with a box hierarchy of its own, so that a point of one
+//! sheet of a thin wall is never put onto the other.
+//!
+//! # Cost
+//! O(F log F) to build; O(log F) a projection.
+
+mod curve;
+mod sample;
+
+use glam::DVec3;
+use rustc_hash::FxHashMap;
+
+pub use curve::Curve;
+pub(crate) use sample::respread;
+pub use sample::sample;
+
+use super::mixed::{Mixed, NONE, Place};
+use crate::mesh::bvh::TriangleBvh;
+use crate::mesh::geometry::triangle_normal;
+use crate::mesh::topology::EdgeTable;
+use crate::mesh::{FaceId, Freedom, Surface, VertexId};
+
+/// A turn of the network above this many degrees is a node.
+const CORNER: f64 = 40.0;
+
+/// One region's faces.
+#[derive(Debug)]
+struct Sheet {
+    tree: TriangleBvh,
+    faces: Vec<FaceId>,
+}
+
+/// A point put onto the surface.
+#[derive(Clone, Copy, Debug)]
+pub struct Foot {
+    /// Where.
+    pub point: DVec3,
+    /// The unit normal of the face there, zero where it has none.
+    pub normal: DVec3,
+    /// The face.
+    pub face: FaceId,
+    /// The squared distance moved.
+    pub distance_squared: f64,
+}
+
+/// The surface, its curves and its regions.
+#[derive(Debug)]
+pub struct Ground<'a> {
+    /// The surface.
+    pub surface: &'a Surface,
+    /// The curves.
+    pub curves: Vec<Curve>,
+    /// The region of each face.
+    pub regions: Vec<u32>,
+    /// What each vertex of the surface is bound to.
+    pub places: Vec<Place>,
+    arcs: FxHashMap<[VertexId; 2], u32>,
+    sheets: Vec<Sheet>,
+    /// The regions on both sides of each curve, [`NONE`] beyond a rim.
+    pub beside: Vec<[u32; 2]>,
+}
+
+impl<'a> Ground<'a> {
+    /// Finds curves and regions of a surface.
+    pub fn new(surface: &'a Surface) -> Self {
+        let edges = EdgeTable::new(surface);
+        let network = curve::network(surface, &edges);
+        let is_node = curve::nodes(surface, &network, CORNER);
+        let curves = curve::curves(surface, &network, is_node);
+        let mut arcs = FxHashMap::default();
+        for (arc, curve) in curves.iter().enumerate() {
+            for pair in curve.vertices.windows(2) {
+                arcs.insert(crate::mesh::edge_key(pair[0], pair[1]), arc as u32);
+            }
+        }
+        let (regions, count) = flood(surface, &edges, &arcs);
+        let places = places(surface, &curves, &regions);
+        let beside = beside(&edges, &curves, &regions);
+        let mut of: Vec<Vec<FaceId>> = vec![Vec::new(); count];
+        for f in surface.faces.ids() {
+            of[regions[f.index()] as usize].push(f);
+        }
+        let sheet = |faces: Vec<FaceId>| Sheet {
+            tree: TriangleBvh::new(faces.iter().map(|&f| surface.corners(f)).collect()),
+            faces,
+        };
+        Self { surface, curves, regions, places, arcs, sheets: of.into_iter().map(sheet).collect(), beside }
+    }
+
+    /// Number of regions.
+    pub fn region_count(&self) -> usize {
+        self.sheets.len()
+    }
+
+    /// The faces of a region.
+    pub fn region_faces(&self, region: u32) -> &[FaceId] {
+        &self.sheets[region as usize].faces
+    }
+
+    /// The point of a region nearest to `p`.
+    pub fn project(&self, region: u32, p: DVec3) -> Foot {
+        let sheet = &self.sheets[region as usize];
+        match sheet.tree.closest(p) {
+            Some(closest) => {
+                let face = sheet.faces[closest.index as usize];
+                Foot {
+                    point: closest.nearest.point,
+                    normal: triangle_normal(self.surface.corners(face)).unwrap_or(DVec3::ZERO),
+                    face,
+                    distance_squared: closest.nearest.distance_squared,
+                }
+            }
+            None => Foot { point: p, normal: DVec3::ZERO, face: FaceId::from_raw(0), distance_squared: 0.0 },
+        }
+    }
+
+    /// The surface as a workshop, bound to this ground; `None` where it is no manifold.
+    pub fn workshop(&self) -> Option<Mixed> {
+        let mut soup = self.surface.to_soup();
+        soup.carried = crate::mesh::Carried::default();
+        let arc = |a, b| self.arcs.get(&crate::mesh::edge_key(a, b)).copied().unwrap_or(NONE);
+        Mixed::new(&soup, self.places.clone(), self.regions.clone(), arc)
+    }
+}
+
+/// Faces joined across edges that are on no curve; regions are numbered by their lowest face.
+fn flood(surface: &Surface, edges: &EdgeTable, arcs: &FxHashMap<[VertexId; 2], u32>) -> (Vec<u32>, usize) {
+    let mut beside: Vec<[u32; 3]> = vec![[NONE; 3]; surface.faces.len()];
+    for (_, key, sides) in edges.iter() {
+        if let [s, t] = sides
+            && !arcs.contains_key(&key)
+        {
+            beside[s.face.index()][s.side as usize] = t.face.raw();
+            beside[t.face.index()][t.side as usize] = s.face.raw();
+        }
+    }
+    let mut regions = vec![NONE; surface.faces.len()];
+    let mut count = 0;
+    let mut waiting = Vec::new();
+    for f in 0..surface.faces.len() as u32 {
+        if regions[f as usize] != NONE {
+            continue;
+        }
+        waiting.push(f);
+        regions[f as usize] = count;
+        while let Some(g) = waiting.pop() {
+            for next in beside[g as usize] {
+                if next != NONE && regions[next as usize] == NONE {
+                    regions[next as usize] = count;
+                    waiting.push(next);
+                }
+            }
+        }
+        count += 1;
+    }
+    (regions, count as usize)
+}
+
+/// The regions on both sides of each curve's first edge, and so of all its edges.
+fn beside(edges: &EdgeTable, curves: &[Curve], regions: &[u32]) -> Vec<[u32; 2]> {
+    let of = |curve: &Curve| {
+        let mut sides = [NONE; 2];
+        if let Some(e) = edges.find(crate::mesh::edge_key(curve.vertices[0], curve.vertices[1])) {
+            for (slot, side) in sides.iter_mut().zip(edges.sides(e)) {
+                *slot = regions[side.face.index()];
+            }
+        }
+        sides
+    };
+    curves.iter().map(of).collect()
+}
+
+fn places(surface: &Surface, curves: &[Curve], regions: &[u32]) -> Vec<Place> {
+    let mut places = vec![Place::Node; surface.points.len()];
+    for (f, corners) in surface.faces.enumerate() {
+        for v in corners {
+            places[v.index()] = Place::Region(regions[f.index()]);
+        }
+    }
+    for (v, freedom) in &surface.carried.pins {
+        if *freedom == Freedom::Keep && v.index() < places.len() {
+            places[v.index()] = Place::Node;
+        }
+    }
+    for (arc, curve) in curves.iter().enumerate() {
+        let last = curve.vertices.len() - 1;
+        for (i, v) in curve.vertices.iter().enumerate() {
+            let inside = 0 < i && i < last;
+            places[v.index()] = if inside { Place::Arc { arc: arc as u32, at: curve.along[i] } } else { Place::Node };
+        }
+    }
+    places
+}

@@ -1,0 +1,172 @@
+//! Vertices of curves: put where the samples are, or spread evenly.
+
+use super::Remesher;
+use crate::technique::ground::{respread, sample};
+use crate::technique::mixed::{NONE, Place};
+
+/// A vertex nearer to a sample than this part of the spacing is moved there.
+const NEAR: f64 = 0.3;
+
+impl Remesher<'_, '_> {
+    /// The vertices of each curve in order with their places along it, ends included.
+    pub(super) fn chains(&self) -> Vec<Vec<(f64, u32)>> {
+        let mut chains: Vec<Vec<(f64, u32)>> = vec![Vec::new(); self.ground.curves.len()];
+        for h in self.mesh.edges().filter(|&h| self.mesh.arc(h) != NONE) {
+            let arc = self.mesh.arc(h) as usize;
+            let curve = &self.ground.curves[arc];
+            let ends = [curve.points[0], curve.points[curve.points.len() - 1]];
+            for v in [self.mesh.origin(h), self.mesh.target(h)] {
+                match self.mesh.place(v) {
+                    Place::Arc { at, .. } => chains[arc].push((at, v)),
+                    _ if curve.is_closed() => chains[arc].extend([(0.0, v), (curve.length(), v)]),
+                    _ => {
+                        let [start, end] = ends.map(|p| (p - self.mesh.point(v)).length_squared());
+                        chains[arc].push((if start <= end { 0.0 } else { curve.length() }, v));
+                    }
+                }
+            }
+        }
+        for list in &mut chains {
+            list.sort_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
+            list.dedup();
+        }
+        chains
+    }
+
+    /// Samples every curve and makes its vertices those of the samples.
+    pub(super) fn resample_curves(&mut self) {
+        self.surplus = vec![false; self.mesh.vertex_slots() as usize];
+        let mut chains = self.chains();
+        let mut places: Vec<Vec<f64>> = (0..chains.len()).map(|arc| self.samples(arc, &chains[arc], 1)).collect();
+        for arc in self.cramped(&places) {
+            places[arc] = self.samples(arc, &chains[arc], 2);
+        }
+        for (arc, chain) in chains.iter_mut().enumerate() {
+            if places[arc].len() == 2 && chain.len() > 1 {
+                // A curve shorter than the size: its ends need smaller faces, or nothing between them could move.
+                let length = self.ground.curves[arc].length();
+                for end in [chain[0].1, chain[chain.len() - 1].1] {
+                    let size = self.mesh.size(end).min((1.2 * length).max(self.rules.least_size));
+                    self.mesh.set_size(end, size);
+                }
+            }
+            if chain.len() > 1 {
+                self.fit_curve(arc as u32, chain, &places[arc]);
+            }
+        }
+    }
+
+    /// Where the vertices of a curve should be, with at least so many pieces.
+    fn samples(&self, arc: usize, chain: &[(f64, u32)], least: usize) -> Vec<f64> {
+        let curve = &self.ground.curves[arc];
+        let sizes: Vec<(f64, f64)> = chain.iter().map(|&(at, v)| (at, self.mesh.size(v))).collect();
+        let least = if curve.is_closed() { 4 } else { least };
+        sample(curve, &sizes, self.rules.curve_tolerance, least)
+    }
+
+    /// The curves of one piece round regions of so few pieces that quads would have flat corners there.
+    fn cramped(&self, places: &[Vec<f64>]) -> Vec<usize> {
+        let mut pieces = vec![(0, 0); self.ground.region_count()];
+        for (arc, sides) in self.ground.beside.iter().enumerate() {
+            for &region in sides.iter().filter(|&&r| r != NONE) {
+                pieces[region as usize].0 += places[arc].len() - 1;
+                pieces[region as usize].1 += 1;
+            }
+        }
+        let is_cramped = |r: u32| r != NONE && pieces[r as usize].0 <= 5 && pieces[r as usize] != (4, 4);
+        (0..places.len())
+            .filter(|&arc| places[arc].len() == 2 && self.ground.beside[arc].iter().any(|&r| is_cramped(r)))
+            .collect()
+    }
+
+    fn fit_curve(&mut self, arc: u32, chain: &mut Vec<(f64, u32)>, places: &[f64]) {
+        let curve = &self.ground.curves[arc as usize];
+        let inside: Vec<(f64, u32)> = chain[1..chain.len() - 1].to_vec();
+        let mut taken = vec![false; inside.len()];
+        let mut missing = Vec::new();
+        for k in 1..places.len().saturating_sub(1) {
+            let reach = NEAR * (places[k] - places[k - 1]).min(places[k + 1] - places[k]);
+            let near = inside.partition_point(|&(at, _)| at < places[k]);
+            let pick = [near.wrapping_sub(1), near]
+                .into_iter()
+                .filter(|&i| i < inside.len() && !taken[i] && (inside[i].0 - places[k]).abs() <= reach)
+                .min_by(|&i, &j| (inside[i].0 - places[k]).abs().total_cmp(&(inside[j].0 - places[k]).abs()));
+            let size = 0.5 * (places[k + 1] - places[k - 1]);
+            match pick {
+                Some(i) => {
+                    taken[i] = true;
+                    let place = Place::Arc { arc, at: places[k] };
+                    if self.try_move(inside[i].1, curve.at(places[k]), glam::DVec3::ZERO, place) {
+                        chain[i + 1].0 = places[k];
+                    }
+                    self.note_size(inside[i].1, size);
+                }
+                None => missing.push((places[k], size)),
+            }
+        }
+        for (i, &(_, v)) in inside.iter().enumerate() {
+            self.surplus[v as usize] = !taken[i];
+        }
+        for (at, size) in missing {
+            self.insert(arc, chain, at, size);
+        }
+    }
+
+    /// The size at a curve's vertex is never above the spacing that the curve's bend asked for.
+    fn note_size(&mut self, v: u32, spacing: f64) {
+        let size = self.mesh.size(v).min(1.15 * spacing);
+        self.mesh.set_size(v, size);
+    }
+
+    fn insert(&mut self, arc: u32, chain: &mut Vec<(f64, u32)>, at: f64, size: f64) {
+        let place = chain.partition_point(|&(s, _)| s < at).clamp(1, chain.len() - 1);
+        let (a, b) = (chain[place - 1].1, chain[place].1);
+        let Some(h) = self.mesh.star(a).find(|&h| self.mesh.target(h) == b && self.mesh.arc(h) == arc) else { return };
+        let point = self.ground.curves[arc as usize].at(at);
+        if let Some(v) = self.split(h, point, glam::DVec3::ZERO, Place::Arc { arc, at }, size) {
+            chain.insert(place, (at, v));
+            self.surplus.resize(self.mesh.vertex_slots() as usize, false);
+        }
+    }
+
+    /// From where to where an edge covers its curve.
+    pub(super) fn span(&self, arc: u32, h: u32, length: f64) -> (f64, f64) {
+        let place = |v| match self.mesh.place(v) {
+            Place::Arc { arc: a, at } if a == arc => Some(at),
+            _ => None,
+        };
+        match (place(self.mesh.origin(h)), place(self.mesh.target(h))) {
+            (Some(a), Some(b)) => (a.min(b), a.max(b)),
+            (Some(a), None) | (None, Some(a)) => {
+                // One end is a node: the start's or the end's, whichever it lies at.
+                let node = if place(self.mesh.origin(h)).is_none() { self.mesh.origin(h) } else { self.mesh.target(h) };
+                let curve = &self.ground.curves[arc as usize];
+                let p = self.mesh.point(node);
+                let to_start = (p - curve.points[0]).length_squared();
+                let to_end = (p - curve.points[curve.points.len() - 1]).length_squared();
+                let at_start = if curve.is_closed() { a < 0.5 * length } else { to_start < to_end };
+                if at_start { (0.0, a) } else { (a, length) }
+            }
+            (None, None) => (0.0, length),
+        }
+    }
+
+    /// Spreads the vertices of each curve evenly by the sizes there.
+    pub(super) fn even_curves(&mut self) {
+        for (arc, chain) in self.chains().into_iter().enumerate() {
+            if chain.len() < 3 {
+                continue;
+            }
+            let curve = &self.ground.curves[arc];
+            let sizes: Vec<(f64, f64)> = chain.iter().map(|&(at, v)| (at, self.mesh.size(v))).collect();
+            let places = respread(&sizes, curve.length(), chain.len() - 1);
+            if places.len() != chain.len() {
+                continue;
+            }
+            for k in 1..chain.len() - 1 {
+                let at = places[k];
+                self.try_move(chain[k].1, curve.at(at), glam::DVec3::ZERO, Place::Arc { arc: arc as u32, at });
+            }
+        }
+    }
+}

@@ -1,0 +1,270 @@
+//! Isotropic remeshing between curves: nearly equilateral triangles of the size asked for, curves kept as curves.
+//!
+//! # Algorithm
+//! Rounds of split, collapse, flip and tangential smoothing with the way back onto the region a vertex belongs to.
+//! Curves are sampled anew first: vertices are put where the samples are and the others drawn into them. Then it is
+//! measured where chords leave the surface and where two curves are closer than the size, the size is lowered there,
+//! graded over the mesh, and the rounds go on.
+//!
+//! Based on: M. Botsch, L. Kobbelt. A remeshing approach to multiresolution modeling. SGP 2004.
+//!
+//! # Invariants
+//! - Curves stay connected chains of edges with all nodes; free vertices lie on their own region.
+//! - No edit turns a face against the faces that it replaces.
+//!
+//! # Cost
+//! O(F + result) edits, each a few projections.
+
+mod adapt;
+mod curves;
+mod edit;
+mod parity;
+
+use glam::DVec3;
+
+pub use parity::{odd_regions, pair_up};
+
+use super::ground::Ground;
+use super::mixed::{Mixed, NONE, Place};
+use crate::mesh::bvh::SegmentBvh;
+use crate::mesh::geometry::Aabb;
+use crate::watch::{Cancelled, Watch};
+
+/// What to hold to.
+#[derive(Clone, Copy, Debug)]
+pub struct Rules {
+    /// Largest distance of chords from the surface.
+    pub tolerance: f64,
+    /// Largest distance of chords from the curves.
+    pub curve_tolerance: f64,
+    /// Sizes are not lowered below this.
+    pub least_size: f64,
+    /// How much the size may grow over a unit of length.
+    pub gradation: f64,
+}
+
+/// How often sizes are lowered where they prove too large.
+const ADAPTATIONS: usize = 4;
+/// Rounds of edits between two such measurements.
+const ROUNDS: usize = 5;
+
+/// The remesher at work.
+struct Remesher<'a, 'g> {
+    mesh: &'a mut Mixed,
+    ground: &'a Ground<'g>,
+    rules: Rules,
+    /// Curve vertices that are not wanted any more.
+    surplus: Vec<bool>,
+}
+
+/// Remeshes the workshop of `ground`; each vertex's size says how long edges should be there.
+pub fn remesh(mesh: &mut Mixed, ground: &Ground<'_>, rules: Rules, watch: &Watch) -> Result<(), Cancelled> {
+    let mut work = Remesher { surplus: Vec::new(), mesh, ground, rules };
+    work.note_normals();
+    work.adapt(ADAPTATIONS, watch)
+}
+
+/// Lowers the size about some places (a point, how far about it, the size) and remeshes again.
+pub fn tighten(
+    mesh: &mut Mixed,
+    ground: &Ground<'_>,
+    rules: Rules,
+    places: &[(DVec3, f64, f64)],
+    watch: &Watch,
+) -> Result<(), Cancelled> {
+    let all: Vec<u32> = mesh.vertices().collect();
+    let tree = SegmentBvh::new(all.iter().map(|&v| [mesh.point(v); 2]).collect());
+    for &(at, reach, size) in places {
+        for i in tree.in_box(&Aabb::of([at]).grown(reach)) {
+            let v = all[i as usize];
+            mesh.set_size(v, mesh.size(v).min(size.max(rules.least_size)));
+        }
+    }
+    Remesher { surplus: Vec::new(), mesh, ground, rules }.adapt(1, watch)
+}
+
+/// Rounds of flips and smoothing only, curve vertices evenly spread.
+pub fn polish(mesh: &mut Mixed, ground: &Ground<'_>, rules: Rules, rounds: usize) {
+    let mut work = Remesher { surplus: Vec::new(), mesh, ground, rules };
+    work.even_curves();
+    for _ in 0..rounds {
+        work.flip();
+        work.smooth();
+    }
+    // From here on every free vertex knows its side of the body.
+    for v in 0..work.mesh.vertex_slots() {
+        if work.mesh.is_vertex(v)
+            && let Place::Region(region) = work.mesh.place(v)
+        {
+            let foot = ground.project(region, work.mesh.point(v));
+            work.mesh.set_point(v, foot.point, foot.normal);
+        }
+    }
+}
+
+impl Remesher<'_, '_> {
+    /// Rounds of edits, and so many times lower sizes where they prove too large.
+    fn adapt(&mut self, times: usize, watch: &Watch) -> Result<(), Cancelled> {
+        self.grade();
+        self.resample_curves();
+        for adaptation in 0..=times {
+            for round in 0..ROUNDS {
+                watch.check()?;
+                self.split_long();
+                let collapsed = self.collapse_short();
+                self.flip();
+                self.smooth();
+                if adaptation > 0 && round >= 2 && collapsed == 0 {
+                    break;
+                }
+            }
+            self.mesh.compact();
+            self.surplus.clear();
+            if adaptation == times || !self.lower_sizes() {
+                break;
+            }
+            self.grade();
+            self.resample_curves();
+        }
+        Ok(())
+    }
+
+    fn size_of(&self, h: u32) -> f64 {
+        0.5 * (self.mesh.size(self.mesh.origin(h)) + self.mesh.size(self.mesh.target(h)))
+    }
+
+    fn is_inner(&self, h: u32) -> bool {
+        self.mesh.is_halfedge(h)
+            && self.mesh.arc(h) == NONE
+            && self.mesh.face(h) != NONE
+            && self.mesh.face(h ^ 1) != NONE
+    }
+
+    /// Tells every free vertex the mean normal of its faces.
+    fn note_normals(&mut self) {
+        for v in 0..self.mesh.vertex_slots() {
+            if self.mesh.is_vertex(v) && self.mesh.place(v).is_free() {
+                let faces = self.mesh.faces_at(v);
+                let sum: DVec3 = faces.map(|f| crate::mesh::geometry::area_vector(self.mesh.triangle(f))).sum();
+                self.mesh.set_point(v, self.mesh.point(v), sum.normalize_or_zero());
+            }
+        }
+    }
+
+    fn split_long(&mut self) {
+        for _ in 0..12 {
+            let mut long: Vec<(f64, u32)> = Vec::new();
+            for h in self.mesh.edges() {
+                let excess = self.mesh.length(h) / self.size_of(h);
+                if excess > 4.0 / 3.0 && self.is_inner(h) {
+                    long.push((self.mesh.length(h), h));
+                }
+            }
+            if long.is_empty() {
+                break;
+            }
+            long.sort_by(|x, y| y.0.total_cmp(&x.0).then(x.1.cmp(&y.1)));
+            for (_, h) in long {
+                if self.is_inner(h) {
+                    self.split_inner(h);
+                }
+            }
+            self.flip();
+        }
+    }
+
+    /// Halves an edge inside a region, on the surface.
+    fn split_inner(&mut self, h: u32) {
+        let region = self.mesh.region(self.mesh.face(h));
+        let middle = 0.5 * (self.mesh.point(self.mesh.origin(h)) + self.mesh.point(self.mesh.target(h)));
+        let foot = self.ground.project(region, middle);
+        let size = self.size_of(h);
+        let beside = [h, h ^ 1].map(|k| self.mesh.face_normal(self.mesh.face(k)));
+        let across = foot.normal.dot(beside[0] + beside[1]) < 0.3;
+        if across {
+            // The foot is on another side of the body.
+            let normal = (beside[0] + beside[1]).normalize_or_zero();
+            self.split(h, middle, normal, Place::Region(region), size);
+            return;
+        }
+        // On coarse facets the foot may leave the faces beside the edge; then the middle of the edge itself serves.
+        for point in [foot.point, middle] {
+            if self.split(h, point, foot.normal, Place::Region(region), size).is_some() {
+                return;
+            }
+        }
+    }
+
+    fn collapse_short(&mut self) -> usize {
+        let mut collapsed = 0;
+        for _ in 0..8 {
+            let before = collapsed;
+            for h in (0..self.mesh.halfedge_slots()).step_by(2) {
+                if !self.mesh.is_halfedge(h) {
+                    continue;
+                }
+                let is_short = self.mesh.length(h) < 0.8 * self.size_of(h);
+                if self.mesh.arc(h) != NONE {
+                    for k in [h, h ^ 1] {
+                        if self.is_surplus(self.mesh.target(k)) && self.collapse(k) {
+                            collapsed += 1;
+                            break;
+                        }
+                    }
+                } else if is_short && (self.collapse(h) || self.collapse(h ^ 1)) {
+                    collapsed += 1;
+                }
+            }
+            if 50 * (collapsed - before) <= self.mesh.faces().count() {
+                break;
+            }
+        }
+        collapsed
+    }
+
+    fn is_surplus(&self, v: u32) -> bool {
+        self.surplus.get(v as usize).copied().unwrap_or(false)
+    }
+
+    fn flip(&mut self) {
+        for _ in 0..3 {
+            let mut flips = 0;
+            for h in (0..self.mesh.halfedge_slots()).step_by(2) {
+                if self.is_inner(h) && self.try_flip(h) {
+                    flips += 1;
+                }
+            }
+            if 100 * flips < self.mesh.faces().count() {
+                break;
+            }
+        }
+    }
+
+    fn smooth(&mut self) {
+        for v in 0..self.mesh.vertex_slots() {
+            if !self.mesh.is_vertex(v) {
+                continue;
+            }
+            if let Place::Region(region) = self.mesh.place(v) {
+                let at = self.mesh.point(v);
+                let (mut centre, mut weight, mut normal) = (DVec3::ZERO, 0.0, DVec3::ZERO);
+                for f in self.mesh.faces_at(v) {
+                    let corners = self.mesh.triangle(f);
+                    let vector = crate::mesh::geometry::area_vector(corners);
+                    let area = vector.length();
+                    centre += area * (corners[0] + corners[1] + corners[2]) / 3.0;
+                    weight += area;
+                    normal += vector;
+                }
+                if weight <= 0.0 {
+                    continue;
+                }
+                let normal = normal.normalize_or_zero();
+                let step = centre / weight - at;
+                let wish = at + step - normal * normal.dot(step);
+                let foot = self.ground.project(region, wish);
+                self.try_move(v, foot.point, foot.normal, Place::Region(region));
+            }
+        }
+    }
+}
