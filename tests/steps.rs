@@ -31,5 +31,6 @@ mod steps {
     mod select;
     mod split;
     mod straighten;
+    mod simplify_fit;
     mod subdivide;
 }

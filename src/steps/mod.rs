@@ -19,6 +19,7 @@ pub mod rough_quads;
 pub mod select;
 pub mod split;
 pub mod straighten;
+pub mod simplify_fit;
 pub mod subdivide;
 
 use crate::step::StepDef;
@@ -34,6 +35,7 @@ pub static CATALOG: &[StepDef] = &[
     StepDef::of::<refine::Step>(),
     StepDef::of::<improve_quality::Step>(),
     StepDef::of::<control_properties::Step>(),
+    StepDef::of::<simplify_fit::Step>(),
     StepDef::of::<resolution::Step>(),
     StepDef::of::<adapt_curvature::Step>(),
     StepDef::of::<adapt_region::Step>(),

@@ -3,14 +3,17 @@
 pub mod arcs;
 pub mod belts;
 pub mod clean_quads;
+pub mod aspect_point;
 pub mod collapse;
 pub mod curvature;
 pub mod decimate;
 pub mod defeature;
+pub mod dispersion;
 pub mod eigen;
 pub mod feature;
 pub mod front;
 pub mod ground;
+pub mod fit;
 pub mod halve_edges;
 pub mod heap;
 pub mod hierarchy;

@@ -6,6 +6,7 @@
 
 pub mod collapse;
 pub mod flip;
+pub mod merge_face;
 pub mod relocate;
 pub mod split;
 #[cfg(test)]

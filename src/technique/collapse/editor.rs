@@ -18,6 +18,7 @@ use crate::mesh::geometry::{area_vector, stretch, triangle_size};
 use crate::mesh::halfedge::{HalfedgeMesh, edge_of, twin};
 use crate::mesh::{EdgeId, FaceId, Freedom, VertexId};
 use crate::technique::hierarchy::Recorder;
+use crate::technique::quadric::Quadric;
 
 /// Faces may turn by at most 45 degrees in one edit.
 const LEAST_TURN_COSINE: f64 = std::f64::consts::FRAC_1_SQRT_2;
@@ -197,7 +198,7 @@ impl<'a> Editor<'a> {
     pub fn rate_collapse(&mut self, edge: EdgeId, rules: &CollapseRules) -> Option<f32> {
         let plan = check_collapse(&self.mesh, edge).ok()?;
         let (site, before) = self.prepare_collapse(&plan, rules)?;
-        let found = site.candidates(rules.order).find_map(|p| self.assess(&plan, &site, &before, p, rules));
+        let found = site.candidates(rules.order).find_map(|p| self.assess(plan.placement, &site, &before, p, rules));
         found.map(|after| rules.priority.index(&before, &after))
     }
 
@@ -208,7 +209,7 @@ impl<'a> Editor<'a> {
         let mut last = None;
         for p in site.candidates(rules.order) {
             let p = plan.placement.nearest(p);
-            if last == Some(p) || self.assess(&plan, &site, &before, p, rules).is_none() {
+            if last == Some(p) || self.assess(plan.placement, &site, &before, p, rules).is_none() {
                 continue;
             }
             last = Some(p);
@@ -221,7 +222,7 @@ impl<'a> Editor<'a> {
     }
 
     /// Fills the patch with the star of the edge; the merged vertex's corner comes first in each new face.
-    fn prepare_collapse(&mut self, plan: &CollapsePlan, rules: &CollapseRules) -> Option<(Site, Tally)> {
+    pub(super) fn prepare_collapse(&mut self, plan: &CollapsePlan, rules: &CollapseRules) -> Option<(Site, Tally)> {
         let mesh = &self.mesh;
         plan.ring(mesh, &mut self.ring);
         let valence = plan.new_valence(mesh);
@@ -244,27 +245,36 @@ impl<'a> Editor<'a> {
             before.add(f64::from(self.stretch[f.index()]), f64::from(self.size[f.index()]));
         }
         let centroid = self.ring.iter().map(|&v| mesh.point(v)).sum::<DVec3>() / self.ring.len() as f64;
-        let site = Site {
-            placement: plan.placement,
-            ends: [mesh.point(plan.removed), mesh.point(plan.kept)],
-            centroid,
-            planes: self.quadrics.planes(plan.removed).plus(&self.quadrics.planes(plan.kept)),
-            lines: self.quadrics.lines(plan.removed).plus(&self.quadrics.lines(plan.kept)),
-            origin: self.quadrics.origin,
-        };
-        Some((site, before))
+        let site = self.site_of(plan.placement, &[plan.removed, plan.kept]);
+        Some((Site { centroid, ..site }, before))
+    }
+
+    /// What is known of a place where vertices become one, but for the centroid of their ring.
+    pub(super) fn site_of(&self, placement: Placement, ends: &[VertexId]) -> Site {
+        let (mut planes, mut lines) = (Quadric::default(), Quadric::default());
+        for &v in ends {
+            planes = planes.plus(&self.quadrics.planes(v));
+            lines = lines.plus(&self.quadrics.lines(v));
+        }
+        let points = [ends[0], ends[ends.len() - 1]].map(|v| self.mesh.point(v));
+        Site { placement, ends: points, centroid: DVec3::ZERO, planes, lines, origin: self.quadrics.origin }
+    }
+
+    /// Gives a vertex the planes and lines of one that is gone.
+    pub(super) fn merge_quadrics(&mut self, gone: VertexId, kept: VertexId) {
+        self.quadrics.merge(gone, kept);
     }
 
     /// The new star's tally with the merged vertex at `p`, where quadrics, thresholds and foldover admit it.
-    fn assess(
+    pub(super) fn assess(
         &mut self,
-        plan: &CollapsePlan,
+        placement: Placement,
         site: &Site,
         before: &Tally,
         p: DVec3,
         rules: &CollapseRules,
     ) -> Option<Tally> {
-        let p = plan.placement.nearest(p);
+        let p = placement.nearest(p);
         if !p.is_finite() || !self.keeper.admits_point(&site.planes, &site.lines, p - site.origin) {
             return None;
         }
@@ -308,7 +318,7 @@ impl<'a> Editor<'a> {
     }
 
     /// Whether the curve through the edge stays near the reference's curves.
-    fn curve_admits(&self, plan: &CollapsePlan, p: DVec3) -> bool {
+    pub(super) fn curve_admits(&self, plan: &CollapsePlan, p: DVec3) -> bool {
         let Keeper::Distance { curves, .. } = &self.keeper else { return true };
         if self.mesh.edge_freedom(edge_of(plan.halfedge)) != Freedom::OnCurve {
             return true;
@@ -358,7 +368,7 @@ impl<'a> Editor<'a> {
         true
     }
 
-    fn apply_collapse(&mut self, plan: &CollapsePlan, p: DVec3) {
+    pub(super) fn apply_collapse(&mut self, plan: &CollapsePlan, p: DVec3) {
         if let Some(recorder) = &mut self.recorder {
             recorder.collapse(&self.mesh, plan, p);
         }

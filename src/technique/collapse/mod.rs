@@ -22,6 +22,7 @@ pub mod editor;
 pub mod envelope;
 pub mod keeper;
 pub mod limits;
+pub mod merge;
 pub mod placement;
 pub mod priority;
 pub mod quadrics;
@@ -35,6 +36,7 @@ pub use editor::{CollapseRules, Counts, Editor};
 pub use envelope::Envelope;
 pub use keeper::{Curves, Keeper};
 pub use limits::{Limits, SizeField};
+pub use merge::Merge;
 pub use placement::Order;
 pub use priority::Priority;
 

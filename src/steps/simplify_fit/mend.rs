@@ -1,0 +1,243 @@
+//! Faces above the aspect ratio allowed: what collapses cannot reach.
+//!
+//! A tessellation spans flat faces and fillets with needles as long as the part, and no collapse removes one that runs
+//! from curve to curve. Where neither a collapse nor a flip helps, the longest edge of the longest-edge path from the
+//! face is halved: M.-C. Rivara, New longest-edge algorithms for the refinement and/or improvement of unstructured
+//! triangulations, IJNME 40, 1997. Halving changes no geometry; the simplification then goes on to its target, and may
+//! make no face that breaks the limit.
+
+use glam::DVec3;
+
+use super::cases::Bench;
+use crate::mesh::geometry::{angle, area_vector, triangle_area};
+use crate::mesh::halfedge::{edge_of, twin};
+use crate::mesh::{EdgeId, FaceId, Freedom, HalfedgeId, VertexId};
+use crate::technique::collapse::session::best_stretch_at;
+use crate::technique::collapse::{CollapseRules, Order, Priority};
+use crate::technique::remesh::{Gain, faces_below};
+use crate::watch::{Cancelled, Watch};
+
+/// Halvings on the way from one face.
+const MOST_HALVINGS: usize = 16;
+
+/// Rounds before the strict ones begin.
+const MIXED_ROUNDS: usize = 6;
+
+/// Mending ends when it has made this many times as many faces.
+const MOST_GROWTH: usize = 2;
+
+/// Faces on a longest-edge path.
+const MOST_STEPS: usize = 64;
+
+/// Rounds over the faces below the limit.
+const MOST_ROUNDS: usize = 16;
+
+/// Mends the faces below a stretch, worst first. Returns how many are left.
+pub(super) fn mend(bench: &mut Bench<'_, '_>, limit: f64, watch: &Watch) -> Result<usize, Cancelled> {
+    let rules = CollapseRules {
+        min_stretch: limit,
+        mean_stretch: 0.0,
+        mend_below: Some(limit),
+        order: Order::OnSurface,
+        priority: Priority::SmallFirst { size: 1.0 },
+    };
+    let mut left = faces_below(bench.editor, limit);
+    let most = MOST_GROWTH * bench.editor.mesh().face_count();
+    for round in 0..MOST_ROUNDS {
+        if left.is_empty() {
+            break;
+        }
+        watch.phase("mend", Some(left.len() as u64));
+        for (place, &f) in left.iter().enumerate() {
+            if place.is_multiple_of(64) {
+                watch.check()?;
+                watch.advance(place as u64, || format!("{} faces", bench.editor.mesh().face_count()));
+            }
+            mend_face(bench, f, limit, round >= MIXED_ROUNDS, &rules);
+        }
+        let rest = faces_below(bench.editor, limit);
+        if rest == left
+            || bench.editor.mesh().face_count() > most
+            || (round >= MIXED_ROUNDS && rest.len() > 2 * left.len() + 50)
+        {
+            break;
+        }
+        left = rest;
+    }
+    Ok(left.len())
+}
+
+fn is_bad(bench: &Bench<'_, '_>, f: FaceId, limit: f64) -> bool {
+    bench.editor.mesh().face_is_live(f) && bench.editor.stretch(f) < limit
+}
+
+/// Collapses and flips that bring the face nearer to the limit, and halvings where there is none. A collapse or flip may
+/// undo the first halving of a needle for ever; so in `strict` rounds only collapses count that leave no face below.
+fn mend_face(bench: &mut Bench<'_, '_>, f: FaceId, limit: f64, strict: bool, rules: &CollapseRules) {
+    for _ in 0..MOST_HALVINGS {
+        if !is_bad(bench, f, limit) {
+            return;
+        }
+        let sides = sides(bench, f);
+        let merged = sides[..2].iter().find_map(|&e| {
+            if strict { merge_well(bench, e, limit, rules) } else { bench.editor.try_collapse(e, rules) }
+        });
+        if let Some(v) = merged {
+            bench.settle_fit(v);
+            continue;
+        }
+        if !strict && sides.iter().rev().any(|&e| bench.editor.try_flip(e, Gain::Mend(limit))) {
+            continue;
+        }
+        if is_wedge(bench, f, limit) || !halve(bench, f) {
+            return;
+        }
+    }
+}
+
+/// Whether two curves meet in a corner of the face at an angle that no triangle above the limit has.
+fn is_wedge(bench: &Bench<'_, '_>, f: FaceId, limit: f64) -> bool {
+    let mesh = bench.editor.mesh();
+    let h = mesh.face_halfedge(f);
+    [h, mesh.next(h), mesh.prev(h)].into_iter().any(|out| {
+        let back = mesh.prev(out);
+        let is_curve = |h: HalfedgeId| mesh.edge_freedom(edge_of(h)) != Freedom::Free;
+        let at = mesh.point(mesh.origin(out));
+        let opening = angle(mesh.point(mesh.target(out)) - at, mesh.point(mesh.origin(back)) - at);
+        is_curve(out) && is_curve(back) && opening < 0.5 && best_stretch_at(opening) < limit
+    })
+}
+
+/// Collapses an edge where no face of the new star is below the limit.
+fn merge_well(bench: &mut Bench<'_, '_>, e: EdgeId, limit: f64, rules: &CollapseRules) -> Option<VertexId> {
+    let mesh = bench.editor.mesh();
+    let [a, b] = mesh.ends(e).map(|v| mesh.point(v));
+    let merge = bench.editor.plan_edge(e, rules)?;
+    [0.5 * (a + b), a, b].into_iter().find_map(|wish| {
+        let p = merge.placement.nearest(wish);
+        if bench.editor.stretch_at(p) < limit { None } else { bench.editor.try_merge(&merge, p, rules) }
+    })
+}
+
+/// The sides of a face, shortest first.
+fn sides(bench: &Bench<'_, '_>, f: FaceId) -> [EdgeId; 3] {
+    let mesh = bench.editor.mesh();
+    let h = mesh.face_halfedge(f);
+    let mut sides = [h, mesh.next(h), mesh.prev(h)].map(|h| (length_squared(bench, h), edge_of(h)));
+    sides.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    sides.map(|(_, e)| e)
+}
+
+fn length_squared(bench: &Bench<'_, '_>, h: HalfedgeId) -> f64 {
+    let mesh = bench.editor.mesh();
+    mesh.point(mesh.origin(h)).distance_squared(mesh.point(mesh.target(h)))
+}
+
+/// Halves the edge at the end of the longest-edge path from a face.
+fn halve(bench: &mut Bench<'_, '_>, f: FaceId) -> bool {
+    let longest = |bench: &Bench<'_, '_>, f: FaceId| {
+        let mesh = bench.editor.mesh();
+        let h = mesh.face_halfedge(f);
+        let sides = [h, mesh.next(h), mesh.prev(h)];
+        // Of equal sides the one of the lowest edge, seen alike from both faces.
+        sides.into_iter().max_by(|&a, &b| {
+            length_squared(bench, a).total_cmp(&length_squared(bench, b)).then(edge_of(b).cmp(&edge_of(a)))
+        })
+    };
+    let Some(mut h) = longest(bench, f) else { return false };
+    for _ in 0..MOST_STEPS {
+        let Some(beyond) = bench.editor.mesh().face(twin(h)) else { break };
+        let Some(next) = longest(bench, beyond) else { break };
+        if edge_of(next) == edge_of(h) {
+            break;
+        }
+        h = next;
+    }
+    let mesh = bench.editor.mesh();
+    let middle = 0.5 * (mesh.point(mesh.origin(h)) + mesh.point(mesh.target(h)));
+    let limit = bench.editor.set_min_stretch(0.0);
+    let made = bench.editor.try_split(edge_of(h), middle);
+    bench.editor.set_min_stretch(limit);
+    let Some(v) = made else { return false };
+    bench.surfaces.carry(v, None, true);
+    bench.update(v);
+    true
+}
+
+/// Flips and relaxation that raise the quality: vertices in flat areas move within their plane, vertices on a fit along
+/// it, and no other one moves.
+pub(super) fn polish(bench: &mut Bench<'_, '_>, rounds: usize, watch: &Watch) -> Result<(), Cancelled> {
+    watch.phase("polish", Some(rounds as u64));
+    for round in 0..rounds {
+        watch.advance(round as u64, || format!("{} faces", bench.editor.mesh().face_count()));
+        let mut edits = 0;
+        for e in (0..bench.editor.mesh().edge_slots()).map(EdgeId::new) {
+            if e.index().is_multiple_of(256) {
+                watch.check()?;
+            }
+            edits += usize::from(bench.editor.mesh().edge_is_live(e) && flip(bench, e));
+        }
+        for v in (0..bench.editor.mesh().vertex_slots()).map(VertexId::new) {
+            if v.index().is_multiple_of(256) {
+                watch.check()?;
+            }
+            edits += usize::from(bench.editor.mesh().vertex_is_live(v) && relax(bench, v));
+        }
+        if edits * 100 < bench.editor.mesh().vertex_count() {
+            break;
+        }
+    }
+    Ok(())
+}
+
+/// Only between faces below this stretch is a flip worth its tests.
+const WORTH_A_FLIP: f64 = 0.6;
+
+fn flip(bench: &mut Bench<'_, '_>, e: EdgeId) -> bool {
+    let mesh = bench.editor.mesh();
+    let h = crate::mesh::halfedge::halfedge_of(e);
+    let sides = [h, twin(h)].map(|h| mesh.face(h));
+    let is_poor = sides.into_iter().flatten().any(|f| bench.editor.stretch(f) < WORTH_A_FLIP);
+    is_poor && bench.editor.try_flip(e, Gain::LeastStretch)
+}
+
+/// Towards the area-weighted centre of the star.
+fn relax(bench: &mut Bench<'_, '_>, v: VertexId) -> bool {
+    let mesh = bench.editor.mesh();
+    if mesh.vertex_freedom(v) != Freedom::Free || mesh.is_boundary_vertex(v) {
+        return false;
+    }
+    let at = mesh.point(v);
+    let (mut centre, mut weight, mut normal) = (DVec3::ZERO, 0.0, DVec3::ZERO);
+    let mut is_poor = false;
+    for f in mesh.faces_around(v) {
+        let corners = mesh.corner_points(f);
+        let area = triangle_area(corners);
+        centre += area * ((corners[0] - at) + (corners[1] - at) + (corners[2] - at)) / 3.0;
+        weight += area;
+        normal += area_vector(corners);
+        is_poor |= bench.editor.stretch(f) < WORTH_A_FLIP;
+    }
+    let Some(normal) = normal.try_normalize().filter(|_| is_poor && weight > 0.0) else { return false };
+    let step = centre / weight;
+    let step = step - normal * normal.dot(step);
+    let fit = bench.surfaces.of(v).copied();
+    if fit.is_none() && !is_flat(bench, v, normal) {
+        return false;
+    }
+    [1.0, 0.5].into_iter().any(|share| {
+        let wish = at + share * step;
+        let to = fit.map_or(Some(wish), |fit| fit.project(wish));
+        to.is_some_and(|to| bench.editor.try_move(v, to, Gain::Quality))
+    })
+}
+
+/// Whether the whole star lies in one plane.
+fn is_flat(bench: &Bench<'_, '_>, v: VertexId, normal: DVec3) -> bool {
+    let mesh = bench.editor.mesh();
+    let at = mesh.point(v);
+    mesh.neighbours(v).all(|w| {
+        let along = mesh.point(w) - at;
+        along.dot(normal).abs() <= 1e-10 * along.length()
+    })
+}

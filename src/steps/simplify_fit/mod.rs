@@ -1,0 +1,481 @@
+//! Takes faces away where the surface is flat or a fillet, and keeps new vertices on the fillet's true cylinder or sphere.
+//!
+//! # Algorithm
+//! A queue of faces by their shortest side, which counts as longer where the surface turns (the vertex dispersion). The
+//! face at its head collapses as a whole or by an edge, by the number of its corners above the dispersion threshold:
+//! none, one, two, or all three, where a sphere or cylinder is tried on the neighbourhood and the new vertex goes onto
+//! it. The new vertex lies where the aspect ratios round it are best. Then the faces above `max-aspect` are mended, and
+//! the rounds go on until the target holds.
+//!
+//! Based on: Zhang, Wang, Zhou, Li, a paper of 2009 on simplification of finite triangular surface meshes by feature
+//! recognition.
+//!
+//! # Invariants
+//! - Topology, marked curves and kept elements stay; no new self-intersection; no face turns over.
+//! - In `distance` mode the surface stays within the tolerance of the reference, both ways, at every moment.
+//! - A vertex with `fit-kind` above 0 lies on its fit, within 1e-9 of the radius. Flat faces stay exactly flat.
+//! - No edit makes a face worse than both `max-aspect` and the worst face that it replaces.
+//!
+//! # Cost
+//! O(F log F).
+//!
+//! # Departures
+//! The corrections of the printed formulas are told where they are used: `technique::{dispersion, aspect_point, fit}`.
+//! Beyond these: smooth borders of flat faces are curves; when the shortest side may not go, the next one below the same
+//! length may; in the fourth case both kinds of fit are tried, the paper's first; positions beside the optimised one are
+//! tried by the stretch they give; new faces must be good in the first rounds and less so in later ones; needles that
+//! no collapse removes are halved. The paper does not keep the topology and bounds only the error of projections.
+
+mod cases;
+mod mend;
+mod queue;
+mod report;
+mod surfaces;
+mod tangent;
+
+use std::sync::Arc;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::mesh::geometry::{aspect_ratio, centroid, stretch};
+use crate::mesh::halfedge::EnterError;
+use crate::mesh::transfer::inherit_fields;
+use crate::mesh::{Field, FreedomError, LockRules, Support, Surface, VertexId, resolve_freedom};
+use crate::step::{
+    Angle, Artifact, InputDef, Inputs, Length, Locks, OutPort, OutputDef, Port, Produced, Share, StepFailure,
+};
+use crate::technique::collapse::session::{Setup, ToleranceMode, diagonal, open, reference_tree};
+use crate::technique::collapse::{Editor, Limits, SizeField};
+use crate::technique::dispersion::Dispersion;
+use crate::watch::{Cancelled, Watch};
+
+use cases::{Bench, Done};
+use surfaces::Surfaces;
+
+pub use report::{FitKind, Operations, PoorFace, RadiusBin, SimplifyFitStats, Status, Trials};
+
+/// What `tolerance` means.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum FitTolerance {
+    /// The largest distance between result and reference, both ways, kept by certified tests.
+    #[default]
+    Distance,
+    /// The Err of the paper: the distance between a vertex projected onto a fit and the plane of what it replaces. It
+    /// bounds projections only, and nothing that adds up; fast.
+    Plane,
+}
+
+/// Which fits are tried.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Fits {
+    /// Spheres and cylinders.
+    #[default]
+    Both,
+    /// Spheres only.
+    Sphere,
+    /// Cylinders only.
+    Cylinder,
+    /// None: new vertices stay on the collapsed edge or face.
+    None,
+}
+
+/// Simplifies moulded and filleted parts: takes faces away on flat areas and fillets, and keeps fillets round.
+///
+/// Use it where a tessellation spends its faces on fillets that an analysis does not need. Vertices on a fillet carry
+/// its radius as the field `fit-radius`, and `fit-kind`: 1 on a sphere, 2 on a cylinder, 0 elsewhere.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default, rename_all = "kebab-case")]
+pub struct SimplifyFitParams {
+    /// The share of faces to take away. Default 50 %. Not together with `target-faces`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub remove: Option<Share>,
+    /// The number of faces to leave. Default: by `remove`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub target_faces: Option<usize>,
+    /// How far the result may lie from `reference`; see `tolerance-mode`. Default 0.1 % of the reference's diagonal.
+    pub tolerance: Length,
+    /// What `tolerance` means. Default `"distance"`.
+    pub tolerance_mode: FitTolerance,
+    /// How far marked curves may move. Default: half of `tolerance`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub feature_tolerance: Option<Length>,
+    /// Which mean of the angles at a vertex is its dispersion. Default `"rms"`; `"std"` is the paper's, which is zero on
+    /// straight creases.
+    pub dispersion: Dispersion,
+    /// Vertices with a larger dispersion lie on a feature or a fillet. In degrees, default 4: facets of a fillet turn by
+    /// twice as much.
+    pub dispersion_threshold: Angle,
+    /// How much longer sides count where the surface turns: `exp(k-m · dispersion)`, dispersion in radians. Default 1,
+    /// range 0 to 3; 0 is by length alone.
+    #[schemars(range(min = 0.0, max = 3.0))]
+    pub k_m: f64,
+    /// Flat areas: sides shorter than `k1 · L0` go, where `L0` is the shortest edge to be expected at the target.
+    /// Default 1.5.
+    #[schemars(range(min = 0.0, max = 10.0))]
+    pub k1: f64,
+    /// Beside features: sides shorter than `k2 · L0` go. Default 0.75.
+    #[schemars(range(min = 0.0, max = 10.0))]
+    pub k2: f64,
+    /// On fillets: sides shorter than `k3 · L0` go. Default 0.5.
+    #[schemars(range(min = 0.0, max = 10.0))]
+    pub k3: f64,
+    /// Faces up to this aspect ratio collapse as a whole, others by their shortest edge. Default 3; 1 is equilateral.
+    #[schemars(range(min = 1.0))]
+    pub fine_aspect: f64,
+    /// Which surfaces are fitted. Default `"both"`.
+    pub fit: Fits,
+    /// Faces above this aspect ratio are mended, at least 2; no edit makes new ones. Default 20, the paper's measure of
+    /// quality.
+    #[schemars(range(min = 2.0))]
+    pub max_aspect: f64,
+    /// Whether the smooth edges of flat faces are kept as curves, so that flat faces stay flat. Default `true`.
+    pub keep_flat: bool,
+}
+
+impl Default for SimplifyFitParams {
+    fn default() -> Self {
+        Self {
+            remove: None,
+            target_faces: None,
+            tolerance: Length::Percent(0.1),
+            tolerance_mode: FitTolerance::Distance,
+            feature_tolerance: None,
+            dispersion: Dispersion::Rms,
+            dispersion_threshold: Angle(4.0),
+            k_m: 1.0,
+            k1: 1.5,
+            k2: 0.75,
+            k3: 0.5,
+            fine_aspect: 3.0,
+            fit: Fits::Both,
+            max_aspect: 20.0,
+            keep_flat: true,
+        }
+    }
+}
+
+/// Why simplification with fits refused.
+#[derive(Debug, thiserror::Error)]
+pub enum SimplifyFitError {
+    /// Two ways to say how far to go.
+    #[error("`remove` and `target-faces` both say how many faces to leave")]
+    TwoTargets,
+    /// A parameter is out of range.
+    #[error("{name} must be {range}, got {value}")]
+    OutOfRange {
+        /// The parameter.
+        name: &'static str,
+        /// What it may be.
+        range: &'static str,
+        /// What it is.
+        value: f64,
+    },
+    /// A lock names a group that is not there.
+    #[error(transparent)]
+    Locks(#[from] FreedomError),
+    /// The input is no surface.
+    #[error(transparent)]
+    NotASurface(#[from] EnterError),
+    /// The run was interrupted.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+}
+
+/// What simplification with fits works on.
+#[derive(Clone, Copy, Debug)]
+pub struct SimplifyFitInput<'a> {
+    /// The surface to simplify.
+    pub surface: &'a Surface,
+    /// What the tolerance is measured against.
+    pub reference: &'a Surface,
+    /// What must stay.
+    pub locks: LockRules<'a>,
+}
+
+/// Rounds of mending and simplification after it.
+const MOST_MENDINGS: usize = 5;
+
+/// Rounds of flips and relaxation at the end.
+const POLISH_ROUNDS: usize = 3;
+
+/// Simplifies `input.surface`.
+///
+/// # Errors
+/// [`SimplifyFitError`]: parameters or groups that do not fit. A target that cannot be reached is no error; the
+/// statistics say so.
+pub fn simplify_fit(
+    input: SimplifyFitInput<'_>,
+    params: &SimplifyFitParams,
+    watch: &Watch,
+) -> Result<(Surface, SimplifyFitStats), SimplifyFitError> {
+    let plan = Plan::new(&input, params)?;
+    let (surface, smooth_edges) = marked(input.surface, params);
+    // Only where the reference tells its own curves it must tell the smooth ones too.
+    let shares = std::ptr::eq(input.surface, input.reference);
+    let other = (!shares && !input.reference.carried.marks.is_empty()).then(|| marked(input.reference, params).0);
+    let reference = if shares { &surface } else { other.as_ref().unwrap_or(input.reference) };
+    let freedom = resolve_freedom(&surface, &input.locks)?;
+    let tree = reference_tree(plan.setup.mode, reference);
+    let mut editor = open(&surface, &freedom, reference, &tree, plan.setup.clone())?;
+    let mut fits = Surfaces::new(editor.mesh().vertex_slots(), plan.tolerance);
+    let done = run(&mut editor, &mut fits, params, &plan, watch)?;
+    let counts = editor.counts();
+    let distance_bound = editor.certified_distance(plan.tolerance);
+    let slots: Vec<VertexId> = editor.mesh().vertices().collect();
+    let on_fits: Vec<_> = slots.iter().map(|&v| on_fit(&fits, editor.mesh().point(v), v)).collect();
+    let mut result = editor.into_mesh().leave().surface;
+    tangent::without_smooth_lines(&mut result);
+    inherit_fields(input.surface, &mut result);
+    set_fields(&mut result, &on_fits);
+    let mut stats = quality(&result, params.max_aspect);
+    stats.faces_before = input.surface.faces.len();
+    stats.target_faces = plan.target;
+    stats.removed = 1.0 - result.faces.len() as f64 / input.surface.faces.len().max(1) as f64;
+    let holds = result.faces.len() <= plan.target && stats.faces_above_aspect == 0;
+    stats.status = if holds { Status::TargetReached } else { Status::Stuck };
+    stats.operations = operations(&done, counts);
+    stats.spheres = Trials { tried: fits.tried[0], accepted: fits.accepted[0] };
+    stats.cylinders = Trials { tried: fits.tried[1], accepted: fits.accepted[1] };
+    stats.vertices_on_fits = on_fits.iter().flatten().count();
+    stats.radii = report::histogram(on_fits.into_iter().flatten());
+    stats.largest_projection = done.largest_projection;
+    stats.refused_by_tolerance = counts.beyond_tolerance;
+    stats.refused_by_intersection = counts.collisions;
+    stats.smooth_edges = smooth_edges;
+    stats.tolerance = plan.tolerance;
+    stats.distance_bound = distance_bound;
+    Ok((result, stats))
+}
+
+/// The loop of the paper, then mending and the loop again until the target holds on good faces.
+fn run(
+    editor: &mut Editor<'_>,
+    fits: &mut Surfaces,
+    params: &SimplifyFitParams,
+    plan: &Plan,
+    watch: &Watch,
+) -> Result<Done, Cancelled> {
+    let limit = plan.setup.limits.min_stretch;
+    let is_plane = params.tolerance_mode == FitTolerance::Plane;
+    let mut bench = Bench {
+        dispersion: vec![0.0; editor.mesh().vertex_slots()],
+        editor,
+        params,
+        surfaces: fits,
+        done: Done::default(),
+        plane_tolerance: is_plane.then_some(plan.tolerance),
+    };
+    bench.update_all();
+    let mut reached = queue::simplify(&mut bench, plan.target, watch)?;
+    let mut left = usize::MAX;
+    for _ in 0..MOST_MENDINGS {
+        let before = left;
+        left = mend::mend(&mut bench, limit, watch)?;
+        bench.update_all();
+        reached = queue::simplify(&mut bench, plan.target, watch)?;
+        if left == 0 || left >= before {
+            break;
+        }
+    }
+    if reached {
+        mend::polish(&mut bench, POLISH_ROUNDS, watch)?;
+    }
+    Ok(bench.done)
+}
+
+/// What the parameters come to on this input.
+struct Plan {
+    target: usize,
+    tolerance: f64,
+    setup: Setup,
+}
+
+impl Plan {
+    fn new(input: &SimplifyFitInput<'_>, params: &SimplifyFitParams) -> Result<Self, SimplifyFitError> {
+        let target = match (params.remove, params.target_faces) {
+            (Some(_), Some(_)) => return Err(SimplifyFitError::TwoTargets),
+            (None, Some(target)) => target,
+            (remove, None) => {
+                let Share(gone) = remove.unwrap_or(Share(0.5));
+                // A hair more than half a face, so that 75 % of 16 are 12 whatever the rounding.
+                (input.surface.faces.len() as f64 * (1.0 - gone) + 1e-6).floor() as usize
+            }
+        };
+        check(params)?;
+        let diagonal = diagonal(input.reference);
+        let tolerance = params.tolerance.resolve(diagonal);
+        let is_plane = params.tolerance_mode == FitTolerance::Plane;
+        if tolerance.is_nan() || (tolerance <= 0.0 && !is_plane) {
+            let range = "above 0";
+            return Err(SimplifyFitError::OutOfRange { name: "tolerance", range, value: tolerance });
+        }
+        let feature_tolerance = params.feature_tolerance.map_or(0.5 * tolerance, |length| length.resolve(diagonal));
+        // Height over longest side is at least half an inradius over it, so this stretch excludes larger aspects.
+        let limits = Limits {
+            min_stretch: 1.5 / params.max_aspect,
+            max_size: SizeField::Uniform(f64::INFINITY),
+            // Halving must not be stopped by the fans of a tessellation; merges have a limit of their own.
+            max_valence: usize::MAX,
+        };
+        let setup = Setup {
+            mode: if is_plane { ToleranceMode::QuadricRms } else { ToleranceMode::Distance },
+            // Nothing but projections is bounded in plane mode.
+            tolerance: if is_plane { f64::INFINITY } else { tolerance },
+            feature_tolerance,
+            feature_weight: 1.0,
+            limits,
+            may_merge_corners: input.locks.keep.is_empty() && input.locks.only.is_empty(),
+        };
+        Ok(Self { target, tolerance, setup })
+    }
+}
+
+fn check(params: &SimplifyFitParams) -> Result<(), SimplifyFitError> {
+    let within = |name, range, value: f64, [least, most]: [f64; 2]| {
+        if (least..=most).contains(&value) { Ok(()) } else { Err(SimplifyFitError::OutOfRange { name, range, value }) }
+    };
+    within("k-m", "from 0 to 3", params.k_m, [0.0, 3.0])?;
+    within("k1", "from 0 to 10", params.k1, [0.0, 10.0])?;
+    within("k2", "from 0 to 10", params.k2, [0.0, 10.0])?;
+    within("k3", "from 0 to 10", params.k3, [0.0, 10.0])?;
+    within("fine-aspect", "at least 1", params.fine_aspect, [1.0, f64::INFINITY])?;
+    within("max-aspect", "at least 2", params.max_aspect, [2.0, f64::INFINITY])
+}
+
+fn marked(surface: &Surface, params: &SimplifyFitParams) -> (Surface, usize) {
+    if params.keep_flat { tangent::with_smooth_lines(surface) } else { (surface.clone(), 0) }
+}
+
+/// The fit that a vertex lies on, tested on where it lies.
+fn on_fit(fits: &Surfaces, p: glam::DVec3, v: VertexId) -> Option<(FitKind, f64)> {
+    let number = fits.number(v)?;
+    let fit = fits.of(v).filter(|_| fits.holds(number, p))?;
+    Some((FitKind::of(fit), fit.radius()))
+}
+
+fn set_fields(result: &mut Surface, on_fits: &[Option<(FitKind, f64)>]) {
+    let kinds = on_fits.iter().map(|fit| fit.map_or(0.0, |(kind, _)| kind.number())).collect();
+    let radii = on_fits.iter().map(|fit| fit.map_or(0.0, |(_, radius)| radius)).collect();
+    for (name, values) in [("fit-kind", kinds), ("fit-radius", radii)] {
+        result.carried.set_field(Field { name: name.into(), support: Support::Vertex, components: 1, values });
+    }
+}
+
+fn operations(done: &Done, counts: crate::technique::collapse::Counts) -> Operations {
+    let [flat, one, two, three] = done.cases;
+    let merged = 2 * (flat[0] + three[0]) + flat[1] + one[1] + two[1] + three[1];
+    Operations {
+        flat_faces: flat[0],
+        flat_edges: flat[1],
+        opposite_edges: one[1],
+        feature_edges: two[1] - done.onto,
+        onto_features: done.onto,
+        transitional_faces: three[0],
+        transitional_edges: three[1],
+        mended_edges: counts.collapses.saturating_sub(merged),
+        flips: counts.flips,
+        halvings: counts.splits,
+        moves: counts.moves,
+    }
+}
+
+/// The figures that are counted on the result alone.
+fn quality(result: &Surface, max_aspect: f64) -> SimplifyFitStats {
+    let (mut least, mut sum, mut below_20) = (1.0_f64, 0.0, 0_usize);
+    let mut poor = Vec::new();
+    for f in result.faces.ids() {
+        let corners = result.corners(f);
+        let (shape, aspect) = (stretch(corners), aspect_ratio(corners));
+        least = least.min(shape);
+        sum += shape;
+        below_20 += usize::from(aspect < 20.0);
+        if aspect.is_nan() || aspect > max_aspect {
+            let aspect = aspect.is_finite().then_some(aspect);
+            poor.push(PoorFace { face: f.raw(), at: centroid(corners).to_array(), aspect });
+        }
+    }
+    let count = result.faces.len();
+    poor.sort_by(|a, b| {
+        let key = |p: &PoorFace| p.aspect.unwrap_or(f64::INFINITY);
+        key(b).total_cmp(&key(a)).then(a.face.cmp(&b.face))
+    });
+    let faces_above_aspect = poor.len();
+    poor.truncate(64);
+    SimplifyFitStats {
+        status: Status::Stuck,
+        faces_before: count,
+        faces_after: count,
+        target_faces: count,
+        removed: 0.0,
+        operations: Operations::default(),
+        spheres: Trials::default(),
+        cylinders: Trials::default(),
+        vertices_on_fits: 0,
+        radii: Vec::new(),
+        largest_projection: 0.0,
+        refused_by_tolerance: 0,
+        refused_by_intersection: 0,
+        min_stretch: least,
+        mean_stretch: sum / count.max(1) as f64,
+        share_below_20: below_20 as f64 / count.max(1) as f64,
+        faces_above_aspect,
+        poor_faces: poor,
+        smooth_edges: 0,
+        tolerance: 0.0,
+        distance_bound: None,
+    }
+}
+
+impl From<SimplifyFitError> for StepFailure {
+    fn from(error: SimplifyFitError) -> Self {
+        let message = error.to_string();
+        match error {
+            SimplifyFitError::Cancelled(cancelled) => cancelled.into(),
+            SimplifyFitError::TwoTargets => Self::failed(message).with_help("give one of them"),
+            SimplifyFitError::NotASurface(_) => Self::bad_input(message).with_help("run `repair` first"),
+            SimplifyFitError::OutOfRange { .. } | SimplifyFitError::Locks(_) => Self::failed(message),
+        }
+    }
+}
+
+/// The room's entry in the catalog.
+pub struct Step;
+
+impl crate::step::Step for Step {
+    const NAME: &'static str = "simplify-fit";
+    const REVISION: u32 = 1;
+    const INPUTS: &'static [InputDef] = &[
+        InputDef { name: "from", accepts: &[Port::Surface], required: true, doc: "the surface to simplify" },
+        InputDef {
+            name: "reference",
+            accepts: &[Port::Surface],
+            required: false,
+            doc: "what the tolerance is measured against; default: `from`",
+        },
+    ];
+    const OUTPUTS: &'static [OutputDef] = &[OutputDef { name: "main", port: OutPort::Is(Port::Surface) }];
+    const EDITS: bool = true;
+    const CARRIES: &'static str = "Maps groups, regions, marks, pins and seams; takes fields from the nearest points of \
+        `from`; adds the vertex fields `fit-kind` and `fit-radius`.";
+    const EXAMPLE: &'static str = "use = \"simplify-fit\"\nfrom = \"clean\"\nremove = \"50%\"\ntolerance = \"0.1%\"\n";
+
+    type Params = SimplifyFitParams;
+    type Stats = SimplifyFitStats;
+
+    fn run(
+        inputs: &Inputs,
+        _output: &str,
+        params: &SimplifyFitParams,
+        locks: &Locks,
+        watch: &Watch,
+    ) -> Result<Produced<SimplifyFitStats>, StepFailure> {
+        let surface = inputs.surface("from")?;
+        let reference = inputs.surface_opt("reference")?.unwrap_or(surface);
+        let input = SimplifyFitInput { surface, reference, locks: locks.rules() };
+        let (surface, stats) = simplify_fit(input, params, watch)?;
+        Ok(Produced { artifact: Artifact::Surface(Arc::new(surface)), stats })
+    }
+}

@@ -1,0 +1,203 @@
+//! What simplification with fits tells: every figure is counted on the result.
+
+use std::collections::BTreeMap;
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use crate::technique::fit::Quadric;
+
+/// How it ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Status {
+    /// The number of faces asked for is reached, and no face breaks `max-aspect` but excused ones.
+    TargetReached,
+    /// The number of faces was not reached, or faces break `max-aspect`; the figures say which.
+    Stuck,
+}
+
+/// Operations by case: the number of corners of the face whose dispersion was above the threshold.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub struct Operations {
+    /// Case 1, no corner: faces collapsed.
+    pub flat_faces: usize,
+    /// Case 1: edges collapsed.
+    pub flat_edges: usize,
+    /// Case 2, one corner: edges collapsed, nearly always the one opposite.
+    pub opposite_edges: usize,
+    /// Case 3, two corners: edges collapsed along the feature.
+    pub feature_edges: usize,
+    /// Case 3: edges collapsed onto the end of larger dispersion.
+    pub onto_features: usize,
+    /// Case 4, three corners: faces collapsed.
+    pub transitional_faces: usize,
+    /// Case 4: edges collapsed.
+    pub transitional_edges: usize,
+    /// Mending and polish: edges collapsed.
+    pub mended_edges: usize,
+    /// Edges flipped.
+    pub flips: usize,
+    /// Edges halved.
+    pub halvings: usize,
+    /// Vertices moved.
+    pub moves: usize,
+}
+
+/// Trial fits of one kind.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub struct Trials {
+    /// Neighbourhoods that a fit was tried on.
+    pub tried: usize,
+    /// New vertices that were put on one.
+    pub accepted: usize,
+}
+
+/// A radius found in the part.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub struct RadiusBin {
+    /// Sphere or cylinder.
+    pub kind: FitKind,
+    /// The mean radius, in mesh units.
+    pub radius: f64,
+    /// The smallest and the largest radius of the bin.
+    pub range: [f64; 2],
+    /// Vertices of the result on fits with such a radius.
+    pub vertices: usize,
+}
+
+/// The kind of a fit; as a field 1 for spheres, 2 for cylinders.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum FitKind {
+    /// A sphere.
+    Sphere,
+    /// A cylinder.
+    Cylinder,
+}
+
+impl FitKind {
+    /// The kind of a fit.
+    pub fn of(fit: &Quadric) -> Self {
+        match fit {
+            Quadric::Sphere(_) => Self::Sphere,
+            Quadric::Cylinder(_) => Self::Cylinder,
+        }
+    }
+
+    /// The value in the field `fit-kind`.
+    pub fn number(self) -> f64 {
+        match self {
+            Self::Sphere => 1.0,
+            Self::Cylinder => 2.0,
+        }
+    }
+}
+
+/// A face that breaks `max-aspect`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub struct PoorFace {
+    /// Its number in the result.
+    pub face: u32,
+    /// Its centroid.
+    pub at: [f64; 3],
+    /// Its aspect ratio; absent where it has no area.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub aspect: Option<f64>,
+}
+
+/// What simplification with fits did.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub struct SimplifyFitStats {
+    /// How it ended.
+    pub status: Status,
+    /// Faces of the input.
+    pub faces_before: usize,
+    /// Faces of the result.
+    pub faces_after: usize,
+    /// The number of faces asked for.
+    pub target_faces: usize,
+    /// The share of faces that is gone.
+    pub removed: f64,
+    /// Operations by case.
+    pub operations: Operations,
+    /// Trial fits of spheres.
+    pub spheres: Trials,
+    /// Trial fits of cylinders.
+    pub cylinders: Trials,
+    /// Vertices of the result that lie on an accepted fit.
+    pub vertices_on_fits: usize,
+    /// The radii of these fits, most vertices first, at most 32.
+    pub radii: Vec<RadiusBin>,
+    /// The largest Err of the paper: distance of a projected vertex from the plane of what it replaced, in mesh units.
+    pub largest_projection: f64,
+    /// Edits refused because the surface would have left the tolerance.
+    pub refused_by_tolerance: usize,
+    /// Edits refused because faces would have intersected.
+    pub refused_by_intersection: usize,
+    /// Least stretch.
+    pub min_stretch: f64,
+    /// Mean stretch.
+    pub mean_stretch: f64,
+    /// Share of the faces with an aspect ratio below 20, the quality of the paper.
+    pub share_below_20: f64,
+    /// Faces above `max-aspect`.
+    pub faces_above_aspect: usize,
+    /// The worst of them, at most 64.
+    pub poor_faces: Vec<PoorFace>,
+    /// Edges along which flat faces run smoothly into others, kept as curves.
+    pub smooth_edges: usize,
+    /// The tolerance in mesh units.
+    pub tolerance: f64,
+    /// Certified upper bound of the two-sided distance to `reference`, in mesh units; absent with
+    /// `tolerance-mode = "plane"`, and where the input was further away already.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub distance_bound: Option<f64>,
+}
+
+/// Radii of one kind within this part of each other are one.
+const SAME_RADIUS: f64 = 0.01;
+
+/// Bins told.
+const MOST_BINS: usize = 32;
+
+/// The histogram of radii.
+pub(super) fn histogram(fits: impl Iterator<Item = (FitKind, f64)>) -> Vec<RadiusBin> {
+    let mut by_kind: BTreeMap<FitKind, Vec<f64>> = BTreeMap::new();
+    for (kind, radius) in fits {
+        by_kind.entry(kind).or_default().push(radius);
+    }
+    let mut bins = Vec::new();
+    for (kind, mut radii) in by_kind {
+        radii.sort_by(f64::total_cmp);
+        for same in radii.chunk_by(|a, b| b - a <= SAME_RADIUS * a) {
+            let mean = same.iter().sum::<f64>() / same.len() as f64;
+            let range = [same[0], same[same.len() - 1]];
+            bins.push(RadiusBin { kind, radius: mean, range, vertices: same.len() });
+        }
+    }
+    bins.sort_by(|a, b| b.vertices.cmp(&a.vertices).then(a.kind.cmp(&b.kind)).then(a.radius.total_cmp(&b.radius)));
+    bins.truncate(MOST_BINS);
+    bins
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn radii_that_differ_by_less_than_a_hundredth_are_one_fillet() {
+        let radii = [3.0, 3.01, 2.99, 0.5, 0.5].map(|r| (FitKind::Cylinder, r));
+        let bins = histogram(radii.into_iter().chain([(FitKind::Sphere, 3.0)]));
+        assert_eq!(
+            bins.iter().map(|b| (b.kind, b.vertices)).collect::<Vec<_>>(),
+            [(FitKind::Cylinder, 3), (FitKind::Cylinder, 2), (FitKind::Sphere, 1)]
+        );
+        assert!((bins[0].radius - 3.0).abs() < 1e-12 && bins[0].range == [2.99, 3.01]);
+    }
+}

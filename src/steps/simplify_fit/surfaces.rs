@@ -1,0 +1,215 @@
+//! Spheres and cylinders under the vertices: trial fits of neighbourhoods, and which vertex lies on which.
+
+use glam::DVec3;
+use smallvec::SmallVec;
+
+use crate::mesh::geometry::{angle, area_vector, centroid};
+use crate::mesh::halfedge::{HalfedgeMesh, edge_of, twin};
+use crate::mesh::{FaceId, Freedom, VertexId};
+use crate::technique::fit::{FitQuality, Quadric, fit_cylinder, fit_sphere};
+
+/// Points that a trial asks for before it widens the neighbourhood.
+const ENOUGH_POINTS: usize = 8;
+
+/// The least half opening of a neighbourhood, in radians: 15 degrees, an arc of 30.
+const LEAST_OPENING: f64 = 0.262;
+
+/// The largest share of the radius by which it may be uncertain: one standard deviation, so that hardly a radius is
+/// off by a hundredth.
+const MOST_DEVIATION: f64 = 0.004;
+
+/// The largest mean angle in radians between the faces' normals and the fit's: 20 degrees.
+const MOST_TILT: f64 = 0.35;
+
+/// Neighbouring faces whose normals differ by more than this many radians, 50 degrees, are no smooth continuation.
+const SMOOTH: f64 = 0.873;
+
+/// Faces of a neighbourhood at most.
+const MOST_FACES: usize = 160;
+
+/// How often a neighbourhood is widened.
+const MOST_WIDENINGS: usize = 4;
+
+const NONE: u32 = u32::MAX;
+
+/// A kind of fit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Kind {
+    Sphere,
+    Cylinder,
+}
+
+/// The faces and vertices of a trial.
+#[derive(Debug, Default)]
+struct Patch {
+    faces: Vec<FaceId>,
+    vertices: Vec<VertexId>,
+    points: Vec<DVec3>,
+    vectors: Vec<DVec3>,
+}
+
+/// Accepted fits, and the vertices on them.
+#[derive(Debug)]
+pub(super) struct Surfaces {
+    fits: Vec<Quadric>,
+    of_vertex: Vec<u32>,
+    /// Vertices that were moved and are on no fit: they say nothing of the surface that was there.
+    moved: Vec<bool>,
+    patch: Patch,
+    tolerance: f64,
+    pub(super) tried: [usize; 2],
+    pub(super) accepted: [usize; 2],
+}
+
+impl Surfaces {
+    pub(super) fn new(vertex_slots: usize, tolerance: f64) -> Self {
+        Self {
+            fits: Vec::new(),
+            of_vertex: vec![NONE; vertex_slots],
+            moved: vec![false; vertex_slots],
+            patch: Patch::default(),
+            tolerance,
+            tried: [0; 2],
+            accepted: [0; 2],
+        }
+    }
+
+    /// The fit that a vertex lies on.
+    pub(super) fn of(&self, v: VertexId) -> Option<&Quadric> {
+        self.fits.get(*self.of_vertex.get(v.index())? as usize)
+    }
+
+    /// Says that the vertex was put on a fit.
+    pub(super) fn accept(&mut self, v: VertexId, kind: Kind, quadric: Quadric) {
+        self.accepted[kind as usize] += 1;
+        self.fits.push(quadric);
+        let number = self.fits.len() as u32 - 1;
+        self.carry(v, Some(number), false);
+    }
+
+    /// Says that the vertex stayed on the fit of one whose place it took, or is on none; and whether it was moved.
+    pub(super) fn carry(&mut self, v: VertexId, fit: Option<u32>, moved: bool) {
+        if v.index() >= self.of_vertex.len() {
+            self.of_vertex.resize(v.index() + 1, NONE);
+            self.moved.resize(v.index() + 1, false);
+        }
+        self.of_vertex[v.index()] = fit.unwrap_or(NONE);
+        self.moved[v.index()] = moved;
+    }
+
+    /// Whether the vertex was moved and is on no fit.
+    pub(super) fn was_moved(&self, v: VertexId) -> bool {
+        self.moved.get(v.index()).copied().unwrap_or(false)
+    }
+
+    /// The number of the fit that a vertex lies on.
+    pub(super) fn number(&self, v: VertexId) -> Option<u32> {
+        self.of_vertex.get(v.index()).copied().filter(|&fit| fit != NONE)
+    }
+
+    /// Whether a point lies on a fit, up to rounding.
+    pub(super) fn holds(&self, fit: u32, p: DVec3) -> bool {
+        self.fits.get(fit as usize).is_some_and(|fit| fit.distance(p).abs() <= 1e-9 * fit.radius())
+    }
+
+    /// A fit to the neighbourhood of some vertices that is as good as an accepted one must be.
+    pub(super) fn trial(&mut self, mesh: &HalfedgeMesh, ends: &[VertexId], kind: Kind) -> Option<Quadric> {
+        self.tried[kind as usize] += 1;
+        self.patch.first_ring(mesh, ends, &self.moved);
+        let mut widened = 0;
+        loop {
+            let patch = &self.patch;
+            let fit = match kind {
+                _ if patch.points.len() < ENOUGH_POINTS => None,
+                Kind::Sphere => fit_sphere(&patch.points).ok().map(|(s, q)| (Quadric::Sphere(s), q)),
+                Kind::Cylinder => {
+                    fit_cylinder(&patch.points, &patch.vectors).ok().map(|(c, q)| (Quadric::Cylinder(c), q))
+                }
+            };
+            match fit {
+                Some((quadric, quality)) if quality.opening >= LEAST_OPENING => {
+                    return (self.is_good(&quadric, &quality) && self.is_radial(mesh, &quadric)).then_some(quadric);
+                }
+                _ if widened == MOST_WIDENINGS => return None,
+                _ => {
+                    widened += 1;
+                    let before = self.patch.faces.len();
+                    self.patch.widen(mesh, &self.moved);
+                    if self.patch.faces.len() == before {
+                        return None;
+                    }
+                }
+            }
+        }
+    }
+
+    fn is_good(&self, quadric: &Quadric, quality: &FitQuality) -> bool {
+        quality.rms <= 0.5 * self.tolerance && quality.radius_deviation <= MOST_DEVIATION * quadric.radius()
+    }
+
+    /// Whether the faces' normals point along the fit's, all to one side.
+    fn is_radial(&self, mesh: &HalfedgeMesh, quadric: &Quadric) -> bool {
+        let (mut out, mut inwards, mut total) = (0.0, 0.0, 0.0);
+        for (&f, vector) in self.patch.faces.iter().zip(&self.patch.vectors) {
+            let Some(normal) = quadric.normal(centroid(mesh.corner_points(f))) else { return false };
+            let area = vector.length();
+            let tilt = angle(normal, *vector);
+            out += area * tilt;
+            inwards += area * (std::f64::consts::PI - tilt);
+            total += area;
+        }
+        f64::min(out, inwards) <= MOST_TILT * total
+    }
+}
+
+impl Patch {
+    /// The faces round some vertices, without those behind a curve.
+    fn first_ring(&mut self, mesh: &HalfedgeMesh, ends: &[VertexId], moved: &[bool]) {
+        self.faces.clear();
+        for &v in ends {
+            for f in mesh.faces_around(v) {
+                if !self.faces.contains(&f) && self.faces.len() < MOST_FACES {
+                    self.faces.push(f);
+                }
+            }
+        }
+        self.gather(mesh, moved);
+    }
+
+    /// Adds the faces round all vertices, as far as the surface goes on smoothly and no curve is crossed.
+    fn widen(&mut self, mesh: &HalfedgeMesh, moved: &[bool]) {
+        let mut at = 0;
+        let inner = self.vertices.clone();
+        while at < self.faces.len() {
+            let f = self.faces[at];
+            at += 1;
+            let own = area_vector(mesh.corner_points(f));
+            let first = mesh.face_halfedge(f);
+            for h in [first, mesh.next(first), mesh.prev(first)] {
+                let Some(g) = mesh.face(twin(h)) else { continue };
+                let touches = mesh.corners(g).iter().any(|v| inner.contains(v));
+                let crosses = mesh.edge_freedom(edge_of(h)) != Freedom::Free;
+                if crosses || !touches || self.faces.len() >= MOST_FACES || self.faces.contains(&g) {
+                    continue;
+                }
+                if angle(own, area_vector(mesh.corner_points(g))) <= SMOOTH {
+                    self.faces.push(g);
+                }
+            }
+        }
+        self.gather(mesh, moved);
+    }
+
+    fn gather(&mut self, mesh: &HalfedgeMesh, moved: &[bool]) {
+        let mut vertices: SmallVec<[VertexId; 64]> = self.faces.iter().flat_map(|&f| mesh.corners(f)).collect();
+        vertices.sort_unstable();
+        vertices.dedup();
+        self.vertices.clear();
+        self.vertices.extend_from_slice(&vertices);
+        self.points.clear();
+        let told = vertices.iter().filter(|v| !moved.get(v.index()).copied().unwrap_or(false));
+        self.points.extend(told.map(|&v| mesh.point(v)));
+        self.vectors.clear();
+        self.vectors.extend(self.faces.iter().map(|&f| area_vector(mesh.corner_points(f))));
+    }
+}
