@@ -29,8 +29,8 @@ mod steps {
     mod resolution;
     mod rough_quads;
     mod select;
+    mod simplify_fit;
     mod split;
     mod straighten;
-    mod simplify_fit;
     mod subdivide;
 }

@@ -17,9 +17,9 @@ pub mod repair;
 pub mod resolution;
 pub mod rough_quads;
 pub mod select;
+pub mod simplify_fit;
 pub mod split;
 pub mod straighten;
-pub mod simplify_fit;
 pub mod subdivide;
 
 use crate::step::StepDef;

@@ -1,9 +1,9 @@
 //! What several steps share: algorithms on surfaces that are no step of their own.
 
 pub mod arcs;
+pub mod aspect_point;
 pub mod belts;
 pub mod clean_quads;
-pub mod aspect_point;
 pub mod collapse;
 pub mod curvature;
 pub mod decimate;
@@ -11,19 +11,18 @@ pub mod defeature;
 pub mod dispersion;
 pub mod eigen;
 pub mod feature;
+pub mod fit;
 pub mod front;
 pub mod ground;
-pub mod fit;
 pub mod halve_edges;
 pub mod heap;
 pub mod hierarchy;
-pub mod layout;
-pub mod levels;
-pub mod patches;
 pub mod isotropic;
 pub mod join;
+pub mod layout;
 pub mod levels;
 pub mod mixed;
+pub mod patches;
 pub mod quadric;
 pub mod refine;
 pub mod remesh;
