@@ -60,6 +60,7 @@ mod tests {
             kind: "repair".to_owned(),
             inputs: BTreeMap::from([("from".to_owned(), "raw".to_owned())]),
             key: Some("ab".to_owned()),
+            record: vec![("step".to_owned(), "repair".to_owned())],
             content: None,
             figures: Some(crate::run::Figures { port: "surface".to_owned(), faces: Some(12), ..Default::default() }),
             stats: Some(serde_json::json!({"a": [1, 2.5, null, true], "b": {"c": "text"}, "d": -3})),
@@ -82,7 +83,12 @@ mod tests {
             status: Status::StepFailed,
             cases: vec![case],
             inputs: BTreeMap::from([("a.stl".to_owned(), None)]),
-            timings: Timings { total: 1.5, tasks, files: BTreeMap::new() },
+            timings: Timings {
+                total: 1.5,
+                tasks,
+                files: BTreeMap::new(),
+                ran: BTreeMap::from([("repair".to_owned(), 1)]),
+            },
         };
         assert_eq!(from_ron(&to_ron(&report).unwrap()).unwrap(), report);
     }

@@ -2,7 +2,7 @@
 //!
 //! # Algorithm
 //! Variational shape approximation with barriers, insertion, teleports and cuts into disks; the work is done by
-//! [`vsa`](crate::technique::vsa). The borders are chains of mesh edges; `straighten` and `split` smooth them.
+//! [`vsa`]. The borders are chains of mesh edges; `straighten` and `split` smooth them.
 //!
 //! Based on: D. Cohen-Steiner, P. Alliez, M. Desbrun. Variational shape approximation. ACM SIGGRAPH 2004; R. Miyazaki,
 //! K. Harada. Transformation of a closed 3D triangular mesh to a quadrilateral mesh based on feature edges, section

@@ -41,7 +41,7 @@ fn a_square_and_a_cube_become_regular_grids() {
 #[test]
 fn an_odd_border_leaves_one_triangle_or_gets_one_edge_more() {
     let mut strip = plain(&shapes::grid(8));
-    for p in strip.points.iter_mut() {
+    for p in &mut strip.points {
         *p = dvec3(8.0 * p.x, 5.0 * p.y + p.x * p.y, 0.0);
     }
     for size in [0.9, 1.0, 1.1] {

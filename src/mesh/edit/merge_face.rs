@@ -3,7 +3,7 @@
 //! It is the collapse of one side and then of the edge that the two others became; both must be admitted before the
 //! first is done. Topology: the link conditions of both, the second one on the mesh as the first leaves it, read off the
 //! stars as they are. Only inner faces with at most one corner that is not free: others are left to edge collapse.
-//! Invariants and freedom as in [`super::collapse`]. Cost: O(valence).
+//! Invariants and freedom as in [`mod@super::collapse`]. Cost: O(valence).
 
 use super::collapse::{CollapsePlan, Placement, Ring, check_collapse, collapse};
 use super::{EdgeId, Refusal};

@@ -261,7 +261,7 @@ mod tests {
             let mut spots: Vec<&Spot> = layer.iter().map(|i| &layout.spots[*i]).collect();
             spots.sort_by(|a, b| a.y.total_cmp(&b.y));
             for pair in spots.windows(2) {
-                assert!(pair[1].y - pair[0].y >= (pair[0].height + pair[1].height) / 2.0 - 1e-9);
+                assert!(pair[1].y - pair[0].y >= f64::midpoint(pair[0].height, pair[1].height) - 1e-9);
             }
         }
         assert_eq!(layout.ways.last().map(Vec::len), Some(4));

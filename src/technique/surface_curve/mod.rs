@@ -4,7 +4,7 @@
 //! to straighten it: [`unfold`], local moves by unfolding faces into the plane after D. Martínez, L. Velho,
 //! P. C. Carvalho, *Computing geodesics on triangular meshes*, Computers & Graphics 29(5), 2005; and [`flip`], edge
 //! flips of an intrinsic triangulation after N. Sharp, K. Crane, *You can find geodesic paths in triangle meshes by
-//! just flipping edges*, ACM Transactions on Graphics 39(6), 2020, whose paths [`trace`] draws on the surface.
+//! just flipping edges*, ACM Transactions on Graphics 39(6), 2020, whose paths `trace` draws on the surface.
 //!
 //! Invariants of both: junctions, rims, pinned vertices and marked edges stay; arcs meet nothing but at their ends; no
 //! arc passes over a vertex or an arc that it may not touch, so the network stays the same up to sliding; no arc grows.

@@ -102,7 +102,7 @@ fn a_path_leaves_the_tip_of_a_cone_and_stays_on_a_saddle() {
     let cone = fan(12, [-1.5, -1.5]);
     let over = arc(&[13, 1, 0, 7, 19]);
     let before = 4.0 * 3.25_f64.sqrt();
-    for (way, length) in lengths(&cone, &[over.clone()]).into_iter().enumerate() {
+    for (way, length) in lengths(&cone, std::slice::from_ref(&over)).into_iter().enumerate() {
         assert!(length < 0.99 * before, "{way}: {length} of {before}");
     }
     let saddle = fan(12, [-1.0, 1.0]);
