@@ -137,20 +137,20 @@ fn settle(
     if current != Some(content) {
         whole::write(path, &bytes).map_err(broken("write", path))?;
     }
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    shared.store.publish(
-        key,
-        &Entry {
-            version: VERSION.to_owned(),
-            task: recipe_task(&shared.options.name, &format!("{step} -> {name}")),
-            record: Vec::new(),
-            outcome: Outcome::File { content, bytes: bytes.len() as u64 },
-            stats: serde_json::Value::Null,
-            seconds: 0.0,
-        },
-    )?;
+    let outcome = Outcome::File { content, bytes: bytes.len() as u64 };
+    // The same bytes under another path, as cases of a sweep share them, are known already.
+    if shared.store.entry(key).is_none_or(|known| known.outcome != outcome) {
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        let task = recipe_task(&shared.options.name, &format!("{step} -> {name}"));
+        shared.store.publish(key, &file_entry(task, outcome))?;
+    }
     let state = if current == Some(content) { FileState::Current } else { FileState::Written };
     Ok(Finished::File(state, content))
+}
+
+fn file_entry(task: String, outcome: Outcome) -> Entry {
+    let stats = serde_json::Value::Null;
+    Entry { version: VERSION.to_owned(), task, record: Vec::new(), outcome, stats, seconds: 0.0 }
 }
 
 fn known(shared: &Shared<'_>, task: TaskId) -> Result<ContentHash, Finished> {

@@ -95,10 +95,6 @@ pub(super) static METRICS: &[MetricDef] = &[
     metric("irregular-vertices", Count, Lower, Quads, "Inner vertices whose valence is not 4.", |s| {
         with_quads(s, |s| s.inner_and_irregular().1.len())
     }),
-    metric("triangle-share", Share, Lower, Quads, "Triangles / all faces of a mesh that has quads.", |s| {
-        let faces = s.mesh().faces.len();
-        number((!s.quads().faces.is_empty()).then(|| s.triangles().faces.len() as f64 / faces as f64))
-    }),
     metric(
         "irregular-patch-share",
         Share,

@@ -88,7 +88,8 @@ fn split_double_edges(draft: &mut Draft, twins: &mut Twins) -> u64 {
         for edges in double {
             let sides = edges.iter().flat_map(|&h| [h, twins[h]]).filter(|&h| h != NONE);
             let faces: Vec<usize> = sides.map(|h| face_of(h).index()).collect();
-            if faces.iter().any(|&f| touched[f]) {
+            // A face that is not in the list is the new half of one that was split.
+            if faces.iter().any(|&f| touched.get(f).is_none_or(|&is_touched| is_touched)) {
                 continue;
             }
             for f in faces {

@@ -67,7 +67,8 @@ pub fn repair(soup: &Soup, params: &RepairParams, watch: &Watch) -> Result<(Surf
     let tolerance = params.weld.resolve(diagonal).min(limit);
     let (mut surface, mut stats) = repair_once(soup, params, tolerance, limit, watch)?;
     // What a cut or a dropped face uncovers may need repair as well: go on until nothing changes.
-    let mut unsettled = stats.vertex_copies + stats.repeated_faces + stats.cancelled_faces + stats.slivers_dropped > 0;
+    let cut = stats.vertex_copies + stats.repeated_faces + stats.cancelled_faces + stats.slivers_dropped;
+    let mut unsettled = cut + stats.t_junctions > 0;
     while unsettled && stats.rounds < ROUNDS {
         let rest = (limit - stats.max_move).max(0.0);
         let (again, more) = repair_once(&surface.to_soup(), params, tolerance.min(rest), rest, watch)?;
@@ -168,6 +169,8 @@ fn make_clean_manifold(
 ) -> Result<Twins, RepairError> {
     loop {
         stats.rounds += 1;
+        // A vertex put on an edge may be the apex of its face, and copies joined again may be corners of one face.
+        stats.collapsed_faces += duplicate::drop_collapsed(draft);
         let table = EdgeTable::new(&draft.faces, draft.points.len());
         let table = drop_duplicates(draft, table, params, stats);
         let mut twins = make_manifold(draft, table, stats);
