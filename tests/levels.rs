@@ -1,7 +1,5 @@
 //! Hierarchies as users have them: recorded by a simplification step, cut at any resolution.
 
-use std::time::Instant;
-
 use glam::{DVec3, dvec3};
 use meshmill::mesh::geometry::{stretch, triangle_size};
 use meshmill::mesh::hierarchy::NodeId;
@@ -18,7 +16,7 @@ use meshmill::steps::control_properties::{
 use meshmill::steps::improve_quality::{ImproveQualityInput, ImproveQualityParams, record_quality};
 use meshmill::steps::resolution::{ResolutionError, ResolutionParams, resolution};
 use meshmill::technique::collapse::session::ToleranceMode;
-use meshmill::technique::hierarchy::{Density, Front, curvature_thresholds, extract};
+use meshmill::technique::hierarchy::{Front, extract};
 use meshmill::watch::Watch;
 
 /// A torus about the z axis with a field and two regions, of `2 m n` faces.
@@ -303,31 +301,4 @@ fn density_is_kept_while_the_number_of_faces_changes() {
     assert!((share(&mesh) - share(&like)).abs() < 0.2, "{} for {}", share(&mesh), share(&like));
     let none = adapt_density(&hierarchy, None, &AdaptDensityParams::default(), &watch);
     assert_eq!(none, Err(AdaptDensityError::NotOne));
-}
-
-#[test]
-#[ignore = "measures: cargo test --release --test levels -- --ignored"]
-fn a_front_of_120_000_faces_is_cut_in_a_tenth_of_a_second() {
-    let unlimited = ControlPropertiesParams { max_size: None, ..params() };
-    let (hierarchy, _) = recorded(&torus(300, 200), &unlimited);
-    let thresholds = curvature_thresholds(&hierarchy, 0.5, 0.95, 1.0);
-    let seconds = |cut: &dyn Fn() -> Surface| {
-        let start = Instant::now();
-        let mesh = cut();
-        assert!(!mesh.faces.is_empty());
-        start.elapsed().as_secs_f64()
-    };
-    let by_count = seconds(&|| extract(&Front::with_faces(&hierarchy, 30_000)));
-    let by_curvature = seconds(&|| {
-        let mut front = Front::coarsest(&hierarchy);
-        front.refine_to(&thresholds, &Watch::silent()).unwrap();
-        extract(&front)
-    });
-    let by_density = seconds(&|| {
-        let mut front = Front::with_faces(&hierarchy, 60_000);
-        Density::of(&front).move_to(&mut front, 30_000, &Watch::silent()).unwrap();
-        extract(&front)
-    });
-    let all = [by_count, by_curvature, by_density];
-    assert!(all.iter().all(|&time| time < 0.1), "{all:?} s");
 }

@@ -150,6 +150,14 @@ impl<P: Primitive> Bvh<P> {
     ///
     /// A bound from a nearby query makes this several times faster.
     pub fn closest_within(&self, p: DVec3, bound_squared: f64) -> Option<Closest> {
+        self.near(p, bound_squared, -1.0)
+    }
+
+    /// A primitive at a squared distance of at most `enough_squared`, where there is one; else the nearest among those
+    /// at most `bound_squared` away. Which of several near ones depends on the primitives and `p` only.
+    ///
+    /// Much cheaper than the nearest where anything near enough will do.
+    pub fn near(&self, p: DVec3, bound_squared: f64, enough_squared: f64) -> Option<Closest> {
         let mut best = Nearest { point: p, weights: [0.0; 3], distance_squared: bound_squared };
         let mut index = u32::MAX;
         let mut stack: Stack<(f64, u32)> = Stack::new();
@@ -176,6 +184,9 @@ impl<P: Primitive> Bvh<P> {
                 let closer = nearest.distance_squared < best.distance_squared;
                 if closer || (nearest.distance_squared == best.distance_squared && candidate < index) {
                     (best, index) = (nearest, candidate);
+                }
+                if closer && best.distance_squared <= enough_squared {
+                    return Some(Closest { index, nearest: best });
                 }
             }
         }

@@ -40,6 +40,10 @@ proptest! {
             let again = bvh.closest_within(p, distance).map(|c| c.index);
             prop_assert_eq!(again, Some(index));
             prop_assert!(distance == 0.0 || bvh.closest_within(p, distance * 0.99).is_none());
+            let enough = 2.0 * distance + 0.1;
+            let near = bvh.near(p, f64::INFINITY, enough).map(|c| all[c.index as usize].nearest(p).distance_squared);
+            prop_assert!(near.is_some_and(|near| near <= enough));
+            prop_assert_eq!(bvh.near(p, f64::INFINITY, distance * 0.99).map(|c| c.index), Some(index));
         }
     }
 

@@ -12,19 +12,12 @@ use super::limits::{Limits, least_stretch};
 use super::placement::{Order, Site};
 use super::priority::{Priority, Tally};
 use super::quadrics::Quadrics;
-use crate::mesh::edit::collapse::Ring;
+use super::star::{Bounds, HAS_NORMAL, LEAST_TURN_COSINE, Shape, Star};
 use crate::mesh::edit::{CollapsePlan, Placement, check_collapse, collapse};
 use crate::mesh::geometry::{area_vector, stretch, triangle_size};
 use crate::mesh::halfedge::{HalfedgeMesh, edge_of, twin};
 use crate::mesh::{EdgeId, FaceId, Freedom, VertexId};
 use crate::technique::hierarchy::Recorder;
-use crate::technique::quadric::Quadric;
-
-/// Faces may turn by at most 45 degrees in one edit.
-const LEAST_TURN_COSINE: f64 = std::f64::consts::FRAC_1_SQRT_2;
-
-/// A face below this stretch has no normal that other faces should be held against.
-const HAS_NORMAL: f64 = 0.05;
 
 /// What a collapse must keep besides tolerance and embedding.
 #[derive(Clone, Copy, Debug)]
@@ -79,7 +72,6 @@ pub(in crate::technique) struct Patch {
     pub(in crate::technique) old: Vec<FaceId>,
     /// Successors: their number where they have one already.
     pub(in crate::technique) ids: Vec<FaceId>,
-    pub(in crate::technique) corners: Vec<[VertexId; 3]>,
     pub(in crate::technique) points: Vec<[DVec3; 3]>,
     beside: Vec<FaceId>,
     beside_points: Vec<[DVec3; 3]>,
@@ -89,9 +81,19 @@ impl Patch {
     pub(in crate::technique) fn clear(&mut self) {
         self.old.clear();
         self.ids.clear();
-        self.corners.clear();
         self.points.clear();
     }
+}
+
+/// What became of a collapse.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Attempt {
+    /// It is done; this is the merged vertex.
+    Collapsed(VertexId),
+    /// Cheap tests admit it, with this index, which is less than was asked.
+    Postponed(f32),
+    /// A test refuses it.
+    Refused,
 }
 
 /// A workshop with guards.
@@ -103,10 +105,9 @@ pub struct Editor<'a> {
     pub(in crate::technique) counts: Counts,
     collision: Collision,
     pub(in crate::technique) quadrics: Quadrics,
-    stretch: Vec<f32>,
-    size: Vec<f32>,
+    shapes: Vec<Shape>,
     pub(in crate::technique) patch: Patch,
-    ring: Ring,
+    star: Star,
     recorder: Option<Box<Recorder>>,
 }
 
@@ -116,19 +117,19 @@ impl<'a> Editor<'a> {
         let mut this = Self {
             collision: Collision::new(&mesh),
             quadrics: Quadrics::new(&mesh, feature_weight),
-            stretch: vec![0.0; mesh.face_slots()],
-            size: vec![0.0; mesh.face_slots()],
+            shapes: vec![Shape::default(); mesh.face_slots()],
             mesh,
             keeper,
             limits,
             counts: Counts::default(),
             patch: Patch::default(),
-            ring: Ring::new(),
+            star: Star::default(),
             recorder: None,
         };
         let faces: Vec<FaceId> = this.mesh.faces().collect();
         for f in faces {
-            this.remember_shape(f);
+            let corners = this.mesh.corner_points(f);
+            this.remember_shape(f, corners);
         }
         this
     }
@@ -162,6 +163,11 @@ impl<'a> Editor<'a> {
         self.recorder = Some(Box::new(recorder));
     }
 
+    /// Whether collapses are recorded.
+    pub fn is_recording(&self) -> bool {
+        self.recorder.is_some()
+    }
+
     /// Ends the record.
     pub fn take_recorder(&mut self) -> Option<Recorder> {
         self.recorder.take().map(|recorder| *recorder)
@@ -175,124 +181,119 @@ impl<'a> Editor<'a> {
     /// The stretch of a live face.
     #[inline]
     pub fn stretch(&self, f: FaceId) -> f64 {
-        f64::from(self.stretch[f.index()])
+        f64::from(self.shapes[f.index()].stretch)
     }
 
     /// The size of a live face.
     #[inline]
     pub fn size(&self, f: FaceId) -> f64 {
-        f64::from(self.size[f.index()])
+        f64::from(self.shapes[f.index()].size)
     }
 
-    fn remember_shape(&mut self, f: FaceId) {
-        let corners = self.mesh.corner_points(f);
-        if f.index() >= self.stretch.len() {
-            self.stretch.resize(f.index() + 1, 0.0);
-            self.size.resize(f.index() + 1, 0.0);
+    fn remember_shape(&mut self, f: FaceId, corners: [DVec3; 3]) {
+        if f.index() >= self.shapes.len() {
+            self.shapes.resize(f.index() + 1, Shape::default());
         }
-        self.stretch[f.index()] = stretch(corners) as f32;
-        self.size[f.index()] = triangle_size(corners) as f32;
+        self.shapes[f.index()] = Shape { stretch: stretch(corners) as f32, size: triangle_size(corners) as f32 };
+    }
+
+    /// A cheap stand-in for [`Editor::rate_collapse`]; `None` where the priority has none.
+    pub fn estimate_collapse(&self, edge: EdgeId, rules: &CollapseRules) -> Option<f32> {
+        let [a, b] = self.mesh.ends(edge).map(|v| self.mesh.point(v));
+        rules.priority.estimate(a.distance(b))
     }
 
     /// The index of the edge's collapse where cheap tests admit one; `None` where not.
     pub fn rate_collapse(&mut self, edge: EdgeId, rules: &CollapseRules) -> Option<f32> {
         let plan = check_collapse(&self.mesh, edge).ok()?;
-        let (site, before) = self.prepare_collapse(&plan, rules)?;
-        let found = site.candidates(rules.order).find_map(|p| self.assess(plan.placement, &site, &before, p, rules));
-        found.map(|after| rules.priority.index(&before, &after))
+        let site = self.prepare_collapse(&plan, rules)?;
+        let found = site.candidates(rules.order).find_map(|p| self.assess(&plan, &site, p, rules));
+        found.map(|after| rules.priority.index(&self.star.before, &after))
     }
 
     /// Collapses the edge where all tests admit it; the first candidate that passes wins.
     pub fn try_collapse(&mut self, edge: EdgeId, rules: &CollapseRules) -> Option<VertexId> {
-        let plan = check_collapse(&self.mesh, edge).ok()?;
-        let (site, before) = self.prepare_collapse(&plan, rules)?;
+        match self.collapse_from(edge, rules, f32::NEG_INFINITY) {
+            Attempt::Collapsed(merged) => Some(merged),
+            Attempt::Postponed(_) | Attempt::Refused => None,
+        }
+    }
+
+    /// Collapses the edge where all tests admit it and its index is at least `least`.
+    pub fn collapse_from(&mut self, edge: EdgeId, rules: &CollapseRules, least: f32) -> Attempt {
+        let Ok(plan) = check_collapse(&self.mesh, edge) else { return Attempt::Refused };
+        let Some(site) = self.prepare_collapse(&plan, rules) else { return Attempt::Refused };
         let mut last = None;
         for p in site.candidates(rules.order) {
             let p = plan.placement.nearest(p);
-            if last == Some(p) || self.assess(plan.placement, &site, &before, p, rules).is_none() {
+            if last == Some(p) {
                 continue;
             }
+            let Some(after) = self.assess(&plan, &site, p, rules) else { continue };
+            if last.is_none() {
+                let index = rules.priority.index(&self.star.before, &after);
+                if index < least {
+                    return Attempt::Postponed(index);
+                }
+            }
             last = Some(p);
-            if self.curve_admits(&plan, p) && self.patch_admitted() {
-                self.apply_collapse(&plan, p);
-                return Some(plan.kept);
+            if self.admit_collapse(&plan, p) {
+                return Attempt::Collapsed(plan.kept);
             }
         }
-        None
+        Attempt::Refused
     }
 
-    /// Fills the patch with the star of the edge; the merged vertex's corner comes first in each new face.
-    pub(super) fn prepare_collapse(&mut self, plan: &CollapsePlan, rules: &CollapseRules) -> Option<(Site, Tally)> {
-        let mesh = &self.mesh;
-        plan.ring(mesh, &mut self.ring);
-        let valence = plan.new_valence(mesh);
-        let allowed = self.limits.max_valence.max(mesh.valence(plan.removed)).max(mesh.valence(plan.kept));
-        if valence > allowed || self.ring.is_empty() {
+    /// Applies a collapse that cheap tests admit where the costly ones do too.
+    fn admit_collapse(&mut self, plan: &CollapsePlan, p: DVec3) -> bool {
+        if !self.curve_admits(plan, p) {
+            return false;
+        }
+        self.patch.clear();
+        self.patch.old.extend(self.star.old_faces());
+        for (face, points) in self.star.new_faces(p) {
+            self.patch.ids.push(face);
+            self.patch.points.push(points);
+        }
+        let admitted = self.patch_admitted();
+        if admitted {
+            self.apply_collapse(plan, p);
+        }
+        admitted
+    }
+
+    /// Gathers the star of the edge, where topology and valence allow its collapse.
+    fn prepare_collapse(&mut self, plan: &CollapsePlan, rules: &CollapseRules) -> Option<Site> {
+        let (tallest, valence) = self.star.walk(&self.mesh, plan);
+        if valence > self.limits.max_valence.max(tallest) || self.star.is_empty() {
             return None;
         }
-        let mut before = Tally::short_of(rules.mend_below.unwrap_or(0.0));
-        self.patch.clear();
-        for f in plan.removed_faces(mesh).into_iter().flatten() {
-            self.patch.old.push(f);
-        }
-        for (f, corners) in plan.new_star(mesh) {
-            self.patch.old.push(f);
-            self.patch.ids.push(f);
-            self.patch.corners.push(corners);
-            self.patch.points.push(corners.map(|v| mesh.point(v)));
-        }
-        for f in &self.patch.old {
-            before.add(f64::from(self.stretch[f.index()]), f64::from(self.size[f.index()]));
-        }
-        let centroid = self.ring.iter().map(|&v| mesh.point(v)).sum::<DVec3>() / self.ring.len() as f64;
-        let site = self.site_of(plan.placement, &[plan.removed, plan.kept]);
-        Some((Site { centroid, ..site }, before))
-    }
-
-    /// What is known of a place where vertices become one, but for the centroid of their ring.
-    pub(super) fn site_of(&self, placement: Placement, ends: &[VertexId]) -> Site {
-        let (mut planes, mut lines) = (Quadric::default(), Quadric::default());
-        for &v in ends {
-            planes = planes.plus(&self.quadrics.planes(v));
-            lines = lines.plus(&self.quadrics.lines(v));
-        }
-        let points = [ends[0], ends[ends.len() - 1]].map(|v| self.mesh.point(v));
-        Site { placement, ends: points, centroid: DVec3::ZERO, planes, lines, origin: self.quadrics.origin }
-    }
-
-    /// Gives a vertex the planes and lines of one that is gone.
-    pub(super) fn merge_quadrics(&mut self, gone: VertexId, kept: VertexId) {
-        self.quadrics.merge(gone, kept);
+        let ends = [self.mesh.point(plan.removed), self.mesh.point(plan.kept)];
+        self.star.measure(&self.mesh, &self.shapes, ends, rules.mend_below.unwrap_or(0.0));
+        Some(Site {
+            placement: plan.placement,
+            ends,
+            centroid: self.star.centroid()?,
+            planes: self.quadrics.planes(plan.removed).plus(self.quadrics.planes(plan.kept)),
+            lines: self.quadrics.lines(plan.removed).plus(&self.quadrics.lines(plan.kept)),
+            origin: self.quadrics.origin,
+        })
     }
 
     /// The new star's tally with the merged vertex at `p`, where quadrics, thresholds and foldover admit it.
-    pub(super) fn assess(
-        &mut self,
-        placement: Placement,
-        site: &Site,
-        before: &Tally,
-        p: DVec3,
-        rules: &CollapseRules,
-    ) -> Option<Tally> {
-        let p = placement.nearest(p);
+    fn assess(&mut self, plan: &CollapsePlan, site: &Site, p: DVec3, rules: &CollapseRules) -> Option<Tally> {
+        let p = plan.placement.nearest(p);
         if !p.is_finite() || !self.keeper.admits_point(&site.planes, &site.lines, p - site.origin) {
             return None;
         }
+        let before = self.star.before;
         let floor = least_stretch(rules.min_stretch, before.stretch_min);
         let ceiling =
             if self.limits.max_size.is_unlimited() { f64::INFINITY } else { self.limits.ceiling(p, before.size_max) };
-        let mut after = Tally::short_of(before.threshold);
-        for points in &mut self.patch.points {
-            points[0] = p;
-            let (shape, size) = (stretch(*points), triangle_size(*points));
-            if shape < floor || size > ceiling || shape <= 0.0 {
-                return None;
-            }
-            after.add(shape, size);
-        }
-        let improves = rules.mend_below.is_none() || after.mends(before);
+        let after = self.star.assess(&self.mesh, p, Bounds { floor, ceiling })?;
+        let improves = rules.mend_below.is_none() || after.mends(&before);
         let even = after.mean() >= rules.mean_stretch.min(before.mean());
-        (improves && even && !self.folds()).then_some(after)
+        (improves && even).then_some(after)
     }
 
     /// Whether a face of the patch turns too far: against itself where it has a normal, else against the old star.
@@ -391,9 +392,9 @@ impl<'a> Editor<'a> {
         for &f in patch.old.iter().filter(|&&f| !self.mesh.face_is_live(f)) {
             self.collision.forget(f);
         }
-        for &f in &patch.ids {
-            self.remember_shape(f);
-            self.collision.update(&self.mesh, f, sibling);
+        for (&f, &points) in patch.ids.iter().zip(&patch.points) {
+            self.remember_shape(f, points);
+            self.collision.update(f, self.mesh.corners(f), points, sibling);
         }
         self.collision.tidy(&self.mesh);
         self.patch = patch;
@@ -407,7 +408,7 @@ impl<'a> Editor<'a> {
     /// Whether the vertex may lie at `p`, as far as quadrics say.
     pub(in crate::technique) fn quadrics_admit(&self, v: VertexId, p: DVec3) -> bool {
         let (planes, lines) = (self.quadrics.planes(v), self.quadrics.lines(v));
-        self.keeper.admits_point(&planes, &lines, p - self.quadrics.origin)
+        self.keeper.admits_point(planes, &lines, p - self.quadrics.origin)
     }
 
     /// Whether the collapse of an edge may place its vertex anywhere.

@@ -6,8 +6,9 @@
 //! - **Reference to surface.** The reference is cut into pieces; each is owned by one live face, in whose offset its
 //!   corners lie. An edit must find an owner among the new faces, or those next to them, for every piece of the faces
 //!   that it replaces; a piece that no single face covers is bisected, down to a small part of `ε`.
-//! - **Surface to reference.** Each new face is bisected in the same way until every part lies in the offset of one
-//!   triangle of the reference, found by its box hierarchy, or within `ε` by the Lipschitz bound of its centroid.
+//! - **Surface to reference.** Each new face is cut along the sides of the triangles of the reference that lie under it,
+//!   found by their box hierarchy, until every part lies in the offset of one of them, or within `ε` by the Lipschitz
+//!   bound of its middle.
 //!
 //! Both are local and exact up to rounding, for which 2 % of the tolerance are held back; so the surface as a whole
 //! keeps the tolerance at every moment. Where the input broke it at the beginning, no edit makes that worse.
@@ -17,6 +18,7 @@
 
 use glam::DVec3;
 
+use super::clip::{self, Convex};
 use crate::mesh::bvh::TriangleBvh;
 use crate::mesh::geometry::closest_on_triangle;
 use crate::mesh::halfedge::HalfedgeMesh;
@@ -50,6 +52,8 @@ pub struct Envelope<'a> {
     uncovered: usize,
     hint: usize,
     stack: Vec<Triangle>,
+    parts: Vec<Convex>,
+    targets: Vec<Target>,
     plan: Plan,
 }
 
@@ -91,6 +95,8 @@ impl<'a> Envelope<'a> {
             uncovered: 0,
             hint: 0,
             stack: Vec::new(),
+            parts: Vec::new(),
+            targets: Vec::new(),
             plan: Plan::default(),
         };
         this.cover(mesh, own, face_of, tolerance);
@@ -198,50 +204,83 @@ impl<'a> Envelope<'a> {
     }
 
     /// Whether a triangle lies within the tolerance of the reference.
+    ///
+    /// A part that no single triangle covers is cut along the sides of the one nearest to its middle: what lies over
+    /// that one is judged by its corners, the rest goes on. Neighbouring parts mostly lie near the same triangle, so the
+    /// last one found is asked first, and the tree is searched only until something is near enough.
     fn is_within(&mut self, face: &Triangle) -> bool {
-        self.stack.clear();
-        self.stack.push(*face);
-        let squared = self.reach * self.reach;
+        let mut parts = std::mem::take(&mut self.parts);
+        parts.clear();
+        parts.push(Convex::from_slice(face));
+        let mut known = self.reference_target(self.hint);
         let mut budget = CHECK_BUDGET;
-        while let Some(part) = self.stack.pop() {
-            if self.hint < self.reference.faces.len()
-                && covers(&self.reference.corners(FaceId::new(self.hint)), &part, self.reach)
-            {
-                continue;
-            }
-            let (centre, radius) = ball(&part);
-            let Some(closest) = self.tree.closest_within(centre, squared) else { return false };
-            self.hint = closest.index as usize;
-            if closest.distance() + radius <= self.reach
-                || covers(&self.reference.corners(closest.face()), &part, self.reach)
-            {
-                continue;
-            }
-            let (longest, parts) = bisect(&part);
-            if longest <= self.finest || budget == 0 {
-                return false;
-            }
+        let mut within = true;
+        while let (true, Some(part)) = (within, parts.pop()) {
+            within = budget > 0 && self.settle_part(&part, &mut known, &mut parts);
             budget -= 1;
-            self.stack.extend(parts);
         }
-        true
+        self.parts = parts;
+        within
+    }
+
+    /// Certifies a part, or replaces it by smaller ones; `false` where it reaches out of the zone, or may.
+    fn settle_part(&mut self, part: &Convex, known: &mut Option<Target>, parts: &mut Vec<Convex>) -> bool {
+        let squared = self.reach * self.reach;
+        if known.is_some_and(|known| known.covers(part, squared)) {
+            return true;
+        }
+        let (centre, radius) = clip::ball(part);
+        let slack = (self.reach - radius).max(0.0);
+        if slack > 0.0 && known.is_some_and(|known| known.distance_squared(centre) <= slack * slack) {
+            return true;
+        }
+        let Some(closest) = self.tree.near(centre, squared, slack * slack) else { return false };
+        self.hint = closest.index as usize;
+        *known = self.reference_target(self.hint);
+        let Some(target) = *known else { return false };
+        if closest.nearest.distance_squared <= slack * slack && slack > 0.0 || target.covers(part, squared) {
+            return true;
+        }
+        if target.squared > 0.0
+            && let before = parts.len()
+            && let Some(over) = clip::cut_out(part, target.corners, target.normal, parts)
+        {
+            if target.covers(&over, squared) {
+                return true;
+            }
+            if parts.len() > before {
+                parts.push(over);
+                return true;
+            }
+        }
+        let (extent, halves) = clip::halve(part);
+        parts.extend(halves.into_iter().filter(|half| !half.is_empty()));
+        extent > self.finest
+    }
+
+    fn reference_target(&self, face: usize) -> Option<Target> {
+        (face < self.reference.faces.len()).then(|| Target::new(self.reference.corners(FaceId::new(face)), self.reach))
     }
 
     /// Whether every piece of the old faces finds a new owner.
     fn is_covered(&mut self, old: &[FaceId], new: &[Triangle], beside: &[Triangle]) -> bool {
         let mut plan = std::mem::take(&mut self.plan);
+        let mut targets = std::mem::take(&mut self.targets);
         plan.kept.clear();
         plan.retired.clear();
         plan.parts.clear();
+        targets.clear();
+        targets.extend(new.iter().chain(beside).map(|&face| Target::new(face, self.reach)));
         let mut budget = CHECK_BUDGET;
+        let mut hint = 0;
         let covered = old.iter().all(|face| {
             let mut at = self.head[face.index()];
             while at != NONE {
                 let piece = self.pieces[at as usize];
-                let reach = self.reach_of(&piece);
-                if let Some(target) = find_owner(&piece.corners, new, beside, reach) {
+                let squared = self.squared_reach_of(&piece);
+                if let Some(target) = find_owner(&piece.corners, &targets, &mut hint, squared) {
                     plan.kept.push((at, target));
-                } else if self.split(piece, new, beside, &mut plan, &mut budget) {
+                } else if self.split(piece, &targets, &mut hint, &mut plan, &mut budget) {
                     plan.retired.push(at);
                 } else {
                     return false;
@@ -251,41 +290,42 @@ impl<'a> Envelope<'a> {
             true
         });
         self.plan = plan;
+        self.targets = targets;
         covered
     }
 
-    fn reach_of(&self, piece: &Piece) -> f64 {
-        self.reach.max(f64::from(piece.reach))
+    fn squared_reach_of(&self, piece: &Piece) -> f64 {
+        let reach = self.reach.max(f64::from(piece.reach));
+        reach * reach
     }
 
     /// Bisects a piece until each part has an owner.
     fn split(
         &mut self,
         piece: Piece,
-        new: &[Triangle],
-        beside: &[Triangle],
+        targets: &[Target],
+        hint: &mut usize,
         plan: &mut Plan,
         budget: &mut usize,
     ) -> bool {
-        let reach = self.reach_of(&piece);
-        let squared = reach * reach;
+        let squared = self.squared_reach_of(&piece);
         // A corner out of reach of all faces ends the search before it begins.
-        if piece.corners.iter().any(|&p| nearest(p, new, beside).1 > squared) {
+        if piece.corners.iter().any(|&p| nearest(p, targets, *hint).1 > squared) {
             return false;
         }
         self.stack.clear();
         self.stack.push(piece.corners);
         while let Some(corners) = self.stack.pop() {
-            if let Some(target) = find_owner(&corners, new, beside, reach) {
+            if let Some(target) = find_owner(&corners, targets, hint, squared) {
                 plan.parts.push((Piece { corners, ..piece }, target));
                 continue;
             }
             let (centre, radius) = ball(&corners);
-            let (target, distance_squared) = nearest(centre, new, beside);
+            let (target, distance_squared) = nearest(centre, targets, *hint);
             if distance_squared > squared {
                 return false;
             }
-            if distance_squared.sqrt() + radius <= reach {
+            if distance_squared.sqrt() + radius <= squared.sqrt() {
                 plan.parts.push((Piece { corners, ..piece }, target));
                 continue;
             }
@@ -329,15 +369,76 @@ fn covers(face: &Triangle, part: &Triangle, reach: f64) -> bool {
     part.iter().all(|&p| closest_on_triangle(p, *face).distance_squared <= squared)
 }
 
-/// The first triangle that covers the part; indices run through `new`, then `beside`.
-fn find_owner(part: &Triangle, new: &[Triangle], beside: &[Triangle], reach: f64) -> Option<u32> {
-    new.iter().chain(beside).position(|face| covers(face, part, reach)).map(|at| at as u32)
+/// A triangle that many points are held against, with what does not depend on the point.
+#[derive(Clone, Copy, Debug)]
+struct Target {
+    corners: Triangle,
+    /// Its box, grown by the reach.
+    low: DVec3,
+    high: DVec3,
+    normal: DVec3,
+    /// The square of the normal; 0 where the triangle is too thin to have one.
+    squared: f64,
 }
 
-fn nearest(p: DVec3, new: &[Triangle], beside: &[Triangle]) -> (u32, f64) {
-    let mut best = (0, f64::INFINITY);
-    for (at, face) in new.iter().chain(beside).enumerate() {
-        let squared = closest_on_triangle(p, *face).distance_squared;
+impl Target {
+    fn new(corners: Triangle, reach: f64) -> Self {
+        let [a, b, c] = corners;
+        let normal = (b - a).cross(c - a);
+        let size = (b - a).length_squared().max((c - b).length_squared()).max((a - c).length_squared());
+        let squared = normal.length_squared();
+        // Needles get no shortcut: their normal may be off.
+        let squared = if squared > 1e-12 * size * size { squared } else { 0.0 };
+        Self { corners, low: a.min(b).min(c) - reach, high: a.max(b).max(c) + reach, normal, squared }
+    }
+
+    fn distance_squared(&self, p: DVec3) -> f64 {
+        closest_on_triangle(p, self.corners).distance_squared
+    }
+
+    /// Whether all corners of `part` lie within the root of `squared`: then all of `part` does.
+    fn covers(&self, part: &[DVec3], squared: f64) -> bool {
+        part.iter().all(|&p| self.is_near(p, squared))
+    }
+
+    fn is_near(&self, p: DVec3, squared: f64) -> bool {
+        if self.squared > 0.0 {
+            let height = self.normal.dot(p - self.corners[0]);
+            // A point further from the plane by more than rounding is further from the triangle.
+            if height * height > 1.000_001 * squared * self.squared {
+                return false;
+            }
+        }
+        self.distance_squared(p) <= squared
+    }
+
+    /// Whether `part` reaches out of the box by more than the reach that the box was grown by.
+    fn is_clear_of(&self, low: DVec3, high: DVec3) -> bool {
+        low.cmplt(self.low).any() || high.cmpgt(self.high).any()
+    }
+}
+
+/// A target that covers the part: the one that covered the last part, or the first of all.
+fn find_owner(part: &[DVec3], targets: &[Target], hint: &mut usize, squared: f64) -> Option<u32> {
+    if targets.get(*hint).is_some_and(|target| target.covers(part, squared)) {
+        return Some(*hint as u32);
+    }
+    let (low, high) = part.iter().fold((part[0], part[0]), |(low, high), &p| (low.min(p), high.max(p)));
+    let owner = targets.iter().position(|target| !target.is_clear_of(low, high) && target.covers(part, squared))?;
+    *hint = owner;
+    Some(owner as u32)
+}
+
+/// The target nearest to `p`, and its squared distance; `hint` is one that is likely to be near.
+fn nearest(p: DVec3, targets: &[Target], hint: usize) -> (u32, f64) {
+    let hint = if hint < targets.len() { hint } else { 0 };
+    let mut best = (hint as u32, targets.get(hint).map_or(f64::INFINITY, |target| target.distance_squared(p)));
+    for (at, target) in targets.iter().enumerate() {
+        let height = target.normal.dot(p - target.corners[0]);
+        if at == hint || height * height > 1.000_001 * best.1 * target.squared && target.squared > 0.0 {
+            continue;
+        }
+        let squared = target.distance_squared(p);
         if squared < best.1 {
             best = (at as u32, squared);
         }

@@ -44,7 +44,8 @@ impl Keeper<'_> {
             Self::QuadricRms { most } => {
                 let mean = |sum: f64, count: f64| if count > 0.0 { sum / count } else { 0.0 };
                 let squared = most * most;
-                mean(planes.eval(x), planes.trace()) <= squared && mean(lines.eval(x), lines.trace() / 2.0) <= squared
+                mean(planes.eval(x), planes.trace()) <= squared
+                    && (lines.trace() == 0.0 || mean(lines.eval(x), lines.trace() / 2.0) <= squared)
             }
             Self::Distance { .. } => true,
         }

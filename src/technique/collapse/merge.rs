@@ -7,12 +7,14 @@ use glam::DVec3;
 use smallvec::SmallVec;
 
 use super::editor::{CollapseRules, Editor};
+use super::limits::least_stretch;
 use super::placement::Site;
 use super::priority::Tally;
 use crate::mesh::edit::merge_face::{MergeFacePlan, check_merge_face, merge_face};
 use crate::mesh::edit::{CollapsePlan, Placement, check_collapse};
-use crate::mesh::geometry::stretch;
+use crate::mesh::geometry::{stretch, triangle_size};
 use crate::mesh::{EdgeId, FaceId, VertexId};
+use crate::technique::quadric::Quadric;
 
 /// A merge that topology and freedom admit. Valid until the next edit; the editor holds its star.
 #[derive(Clone, Debug)]
@@ -43,7 +45,15 @@ impl Editor<'_> {
     /// How the ends of an edge may become one.
     pub fn plan_edge(&mut self, edge: EdgeId, rules: &CollapseRules) -> Option<Merge> {
         let plan = check_collapse(&self.mesh, edge).ok()?;
-        let (site, before) = self.prepare_collapse(&plan, rules)?;
+        let mesh = &self.mesh;
+        let allowed = self.limits.max_valence.max(mesh.valence(plan.removed)).max(mesh.valence(plan.kept));
+        if plan.new_valence(mesh) > allowed {
+            return None;
+        }
+        let removed = plan.removed_faces(mesh).into_iter().flatten().collect::<SmallVec<[FaceId; 4]>>();
+        let star = plan.new_star(mesh).collect::<SmallVec<[_; 16]>>();
+        let before = self.fill_patch(&removed, &star, rules);
+        let site = self.site_of(plan.placement, &[plan.removed, plan.kept]);
         let ends = SmallVec::from_slice(&[plan.removed, plan.kept]);
         Some(Merge { kind: Kind::Edge(plan), placement: plan.placement, ends, site, before })
     }
@@ -56,21 +66,63 @@ impl Editor<'_> {
         if plan.new_valence(&self.mesh) > allowed {
             return None;
         }
-        let mut before = Tally::short_of(rules.mend_below.unwrap_or(0.0));
-        self.patch.clear();
-        self.patch.old.extend(plan.removed_faces(&self.mesh));
-        for (f, corners) in plan.new_star(&self.mesh) {
-            self.patch.old.push(f);
-            self.patch.ids.push(f);
-            self.patch.corners.push(corners);
-            self.patch.points.push(corners.map(|v| self.mesh.point(v)));
-        }
-        for &f in &self.patch.old {
-            before.add(self.stretch(f), self.size(f));
-        }
+        let removed = plan.removed_faces(&self.mesh);
+        let star = plan.new_star(&self.mesh).collect::<SmallVec<[_; 16]>>();
+        let before = self.fill_patch(&removed, &star, rules);
         let site = self.site_of(plan.placement, &plan.corners);
         let ends = SmallVec::from_slice(&plan.corners);
         Some(Merge { kind: Kind::Face(plan), placement: plan.placement, ends, site, before })
+    }
+
+    /// Puts a star into the patch: faces that vanish, and survivors whose first corner is the merged vertex.
+    fn fill_patch(&mut self, removed: &[FaceId], star: &[(FaceId, [VertexId; 3])], rules: &CollapseRules) -> Tally {
+        self.patch.clear();
+        self.patch.old.extend_from_slice(removed);
+        for &(f, corners) in star {
+            self.patch.old.push(f);
+            self.patch.ids.push(f);
+            self.patch.points.push(corners.map(|v| self.mesh.point(v)));
+        }
+        let mut before = Tally::short_of(rules.mend_below.unwrap_or(0.0));
+        for &f in &self.patch.old {
+            before.add(self.stretch(f), self.size(f));
+        }
+        before
+    }
+
+    /// What is known of a place where vertices become one.
+    fn site_of(&self, placement: Placement, ends: &[VertexId]) -> Site {
+        let (mut planes, mut lines) = (Quadric::default(), Quadric::default());
+        for &v in ends {
+            planes = planes.plus(self.quadrics.planes(v));
+            lines = lines.plus(&self.quadrics.lines(v));
+        }
+        let points = [ends[0], ends[ends.len() - 1]].map(|v| self.mesh.point(v));
+        // The caller brings the positions: no centroid is asked for.
+        Site { placement, ends: points, centroid: DVec3::ZERO, planes, lines, origin: self.quadrics.origin }
+    }
+
+    /// The new star's tally with the merged vertex at `p`, where quadrics, thresholds and foldover admit it.
+    fn assess_merge(&mut self, merge: &Merge, p: DVec3, rules: &CollapseRules) -> Option<Tally> {
+        let (site, before) = (&merge.site, &merge.before);
+        if !p.is_finite() || !self.keeper.admits_point(&site.planes, &site.lines, p - site.origin) {
+            return None;
+        }
+        let floor = least_stretch(rules.min_stretch, before.stretch_min);
+        let ceiling =
+            if self.limits.max_size.is_unlimited() { f64::INFINITY } else { self.limits.ceiling(p, before.size_max) };
+        let mut after = Tally::short_of(before.threshold);
+        for points in &mut self.patch.points {
+            points[0] = p;
+            let (shape, size) = (stretch(*points), triangle_size(*points));
+            if shape < floor || size > ceiling || shape <= 0.0 {
+                return None;
+            }
+            after.add(shape, size);
+        }
+        let improves = rules.mend_below.is_none() || after.mends(before);
+        let even = after.mean() >= rules.mean_stretch.min(before.mean());
+        (improves && even && !self.folds()).then_some(after)
     }
 
     /// The edges round the star of the last plan, opposite to the merged vertex.
@@ -85,8 +137,8 @@ impl Editor<'_> {
 
     /// Merges at `p` where all tests admit that; the merge must be the last one planned.
     pub fn try_merge(&mut self, merge: &Merge, p: DVec3, rules: &CollapseRules) -> Option<VertexId> {
-        self.assess(merge.placement, &merge.site, &merge.before, p, rules)?;
         let p = merge.placement.nearest(p);
+        self.assess_merge(merge, p, rules)?;
         match &merge.kind {
             Kind::Edge(plan) => {
                 if !(self.curve_admits(plan, p) && self.patch_admitted()) {
@@ -102,7 +154,7 @@ impl Editor<'_> {
                 merge_face(&mut self.mesh, plan, p).ok()?;
                 let kept = plan.corners.into_iter().find(|&v| self.mesh.vertex_is_live(v))?;
                 for gone in plan.corners.into_iter().filter(|&v| v != kept) {
-                    self.merge_quadrics(gone, kept);
+                    self.quadrics.merge(gone, kept);
                 }
                 self.counts.collapses += 2;
                 self.settle();

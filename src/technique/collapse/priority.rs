@@ -59,6 +59,15 @@ impl Tally {
         self.shortfall += (self.threshold - stretch).max(0.0);
     }
 
+    /// Adds a face whose size nobody asks for.
+    #[inline]
+    pub fn add_stretch(&mut self, stretch: f64) {
+        self.faces += 1;
+        self.stretch_sum += stretch;
+        self.stretch_min = self.stretch_min.min(stretch);
+        self.shortfall += (self.threshold - stretch).max(0.0);
+    }
+
     /// Mean stretch.
     pub fn mean(&self) -> f64 {
         if self.faces == 0 { 0.0 } else { self.stretch_sum / self.faces as f64 }
@@ -80,7 +89,21 @@ impl Tally {
 /// Quality below this is no quality: a star of degenerate faces gains a lot, but a finite lot.
 const LEAST_QUALITY: f64 = 1e-9;
 
+/// Least times mean stretch of a star that is fairly good.
+const FAIR_QUALITY: f64 = 0.25;
+
 impl Priority {
+    /// A cheap stand-in for the index of an edge of this length: what it comes to where the star is even and stays fairly
+    /// good; `None` where length says nothing.
+    ///
+    /// An edge shorter than its star is worth more than its index says, because to collapse it spoils the star least.
+    pub fn estimate(self, length: f64) -> Option<f32> {
+        match self {
+            Self::QualityGain => None,
+            Self::SmallFirst { size } => Some((FAIR_QUALITY * size / length.max(f64::MIN_POSITIVE)) as f32),
+        }
+    }
+
     /// The index of a collapse that makes the faces `before` into the faces `after`; larger goes first.
     pub fn index(self, before: &Tally, after: &Tally) -> f32 {
         let index = match self {

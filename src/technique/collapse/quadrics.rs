@@ -49,12 +49,15 @@ impl Quadrics {
     }
 
     /// The planes gathered at a vertex.
-    pub fn planes(&self, v: VertexId) -> Quadric {
-        self.planes[v.index()]
+    pub fn planes(&self, v: VertexId) -> &Quadric {
+        &self.planes[v.index()]
     }
 
     /// The lines gathered at a vertex.
     pub fn lines(&self, v: VertexId) -> Quadric {
+        if self.lines.is_empty() {
+            return Quadric::default();
+        }
         self.lines.get(&v).copied().unwrap_or_default()
     }
 

@@ -92,7 +92,7 @@ impl Cavity {
 
     /// The copy before any edit.
     pub(super) fn start(&self, editor: &Editor<'_>) -> Trial {
-        let of = |v: &VertexId| [editor.quadrics.planes(*v), editor.quadrics.lines(*v)];
+        let of = |v: &VertexId| [*editor.quadrics.planes(*v), editor.quadrics.lines(*v)];
         let quadrics = if editor.keeper.is_certified() { Vec::new() } else { self.vertices.iter().map(of).collect() };
         let mut trial = Trial { mesh: self.mesh.clone(), edits: SmallVec::new(), quadrics, shortfall: 0.0 };
         trial.shortfall = self.shortfall(&trial.mesh);

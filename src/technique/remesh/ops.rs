@@ -44,7 +44,6 @@ impl Editor<'_> {
         self.patch.ids.extend([left, right]);
         for corners in plan.new_faces() {
             let points = corners.map(|v| self.mesh.point(v));
-            self.patch.corners.push(corners);
             self.patch.points.push(points);
         }
         let normals = [left, right].map(|f| area_vector(self.mesh.corner_points(f)));
@@ -117,13 +116,11 @@ impl Editor<'_> {
             far[0] = at;
             let (kept, new) = if from == i { (near, far) } else { (far, near) };
             self.patch.ids.push(face);
-            self.patch.corners.push([from, to, apex]);
             self.patch.points.push(kept);
-            later.push((FaceId::new(first_new + later.len()), [from, to, apex], new));
+            later.push((FaceId::new(first_new + later.len()), new));
         }
-        for (id, corners, points) in later {
+        for (id, points) in later {
             self.patch.ids.push(id);
-            self.patch.corners.push(corners);
             self.patch.points.push(points);
         }
         if !self.split_keeps_stretch() || self.split_folds() || !self.patch_admitted() {
@@ -170,7 +167,6 @@ impl Editor<'_> {
             let corners = self.mesh.corners(f);
             self.patch.old.push(f);
             self.patch.ids.push(f);
-            self.patch.corners.push(corners);
             self.patch.points.push(corners.map(|w| if w == v { to } else { self.mesh.point(w) }));
         }
         let before = self.tally(&self.patch.old, gain);
