@@ -15,6 +15,8 @@ use super::signals::Interrupt;
 
 /// Run a recipe, and again whenever it or a file that it reads changes, until Ctrl-C.
 #[derive(Debug, clap::Args)]
+// The arguments of `run` make a group of the same name.
+#[group(id = "watch")]
 pub(super) struct Arguments {
     #[command(flatten)]
     run: run::Arguments,

@@ -14,7 +14,7 @@ use crate::mesh::halfedge::{edge_of, twin};
 use crate::mesh::{EdgeId, FaceId, Freedom, HalfedgeId, VertexId};
 use crate::technique::collapse::session::best_stretch_at;
 use crate::technique::collapse::{CollapseRules, Order, Priority};
-use crate::technique::remesh::{Gain, faces_below};
+use crate::technique::remesh::{Gain, faces_below, raise_stretch};
 use crate::watch::{Cancelled, Watch};
 
 /// Halvings on the way from one face.
@@ -29,18 +29,15 @@ const MOST_GROWTH: usize = 2;
 /// Faces on a longest-edge path.
 const MOST_STEPS: usize = 64;
 
+/// More faces than that are no rest that a search could mend.
+const MOST_SEARCHED: usize = 200;
+
 /// Rounds over the faces below the limit.
 const MOST_ROUNDS: usize = 16;
 
 /// Mends the faces below a stretch, worst first. Returns how many are left.
 pub(super) fn mend(bench: &mut Bench<'_, '_>, limit: f64, watch: &Watch) -> Result<usize, Cancelled> {
-    let rules = CollapseRules {
-        min_stretch: limit,
-        mean_stretch: 0.0,
-        mend_below: Some(limit),
-        order: Order::OnSurface,
-        priority: Priority::SmallFirst { size: 1.0 },
-    };
+    let rules = rules(limit);
     let mut left = faces_below(bench.editor, limit);
     let most = MOST_GROWTH * bench.editor.mesh().face_count();
     for round in 0..MOST_ROUNDS {
@@ -65,6 +62,35 @@ pub(super) fn mend(bench: &mut Bench<'_, '_>, limit: f64, watch: &Watch) -> Resu
         left = rest;
     }
     Ok(left.len())
+}
+
+fn rules(limit: f64) -> CollapseRules {
+    CollapseRules {
+        min_stretch: limit,
+        mean_stretch: 0.0,
+        mend_below: Some(limit),
+        order: Order::OnSurface,
+        priority: Priority::SmallFirst { size: 1.0 },
+    }
+}
+
+/// Mends the few faces that are left by the search for sequences of edits; vertices that leave their fit are on none.
+pub(super) fn mend_by_search(bench: &mut Bench<'_, '_>, limit: f64, watch: &Watch) -> Result<(), Cancelled> {
+    let count = faces_below(bench.editor, limit).len();
+    if count == 0 || count > MOST_SEARCHED {
+        return Ok(());
+    }
+    let rules = rules(limit);
+    raise_stretch(bench.editor, limit, &rules, watch)?;
+    let mesh = bench.editor.mesh();
+    let left: Vec<VertexId> = mesh
+        .vertices()
+        .filter(|&v| bench.surfaces.number(v).is_some_and(|fit| !bench.surfaces.holds(fit, mesh.point(v))))
+        .collect();
+    for v in left {
+        bench.surfaces.carry(v, None, true);
+    }
+    Ok(())
 }
 
 fn is_bad(bench: &Bench<'_, '_>, f: FaceId, limit: f64) -> bool {

@@ -283,6 +283,7 @@ fn run(
     if reached {
         mend::polish(&mut bench, POLISH_ROUNDS, watch)?;
     }
+    mend::mend_by_search(&mut bench, limit, watch)?;
     Ok(bench.done)
 }
 
@@ -446,7 +447,7 @@ pub struct Step;
 
 impl crate::step::Step for Step {
     const NAME: &'static str = "simplify-fit";
-    const REVISION: u32 = 1;
+    const REVISION: u32 = 2;
     const INPUTS: &'static [InputDef] = &[
         InputDef { name: "from", accepts: &[Port::Surface], required: true, doc: "the surface to simplify" },
         InputDef {
