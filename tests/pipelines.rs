@@ -69,8 +69,10 @@ impl Run {
     /// The files that it wrote, read back.
     fn meshes(&self) -> Vec<(String, Soup)> {
         let files = self.report["cases"][0]["files"].as_array().expect("files");
-        let read_back = files.iter().map(|file| {
-            let path = self.folder.path().join(file["path"].as_str().expect("a path"));
+        let paths = files.iter().map(|file| self.folder.path().join(file["path"].as_str().expect("a path")));
+        // Patches are no mesh.
+        let meshes = paths.filter(|path| path.extension().is_none_or(|ending| ending != "json"));
+        let read_back = meshes.map(|path| {
             let name = path.file_name().expect("a name").to_string_lossy().into_owned();
             let bytes = fs::read(&path).unwrap_or_else(|error| panic!("{name}: {error}"));
             let format = Format::detect(&name, &bytes).expect("a known format");
@@ -95,7 +97,9 @@ fn shipped_pipelines_give_the_golden_metrics_and_sound_files() {
         let meshes = run.meshes();
         assert!(meshes.iter().any(|(file, _)| file == "result.vtu"), "{name} writes no result.vtu");
         for (file, mesh) in &meshes {
-            for property in ["closed", "manifold", "oriented"] {
+            // The part that these two ship with is an open sheet.
+            let is_open = ["rough-quads", "surface-reconstruction"].contains(&name.as_str());
+            for property in ["closed", "manifold", "oriented"].into_iter().skip(usize::from(is_open)) {
                 assert!(holds(mesh, property), "{name}: {file} is not {property}");
             }
         }
