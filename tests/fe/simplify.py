@@ -1,0 +1,219 @@
+#!/usr/bin/env python3
+"""What simplification costs an analysis: the same shell, solved on meshes with more and more faces taken away.
+
+    python3 tests/fe/simplify.py --meshmill target/release/meshmill --part part.stl [--shares 0,20,35,50,68,75]
+        [--tolerance 0.1%] [--thickness 0.01%] [--most-error 2%] [--work DIR] [--json FILE]
+
+README.md in this folder tells the two cases and why they are what they are. Needs CalculiX (`ccx`) and nothing else.
+Exits with 1 when a share asked for is missed, an analysis fails, or an error is above both `--most-error` and that of
+the first share.
+"""
+import argparse
+import json
+import os
+import re
+import resource
+import shutil
+import subprocess
+import sys
+import tempfile
+
+# Newton, millimetre, tonne, second. The device weighs hundreds of times as much as the shell: its modes come first.
+STEEL = "*MATERIAL, NAME=STEEL\n*ELASTIC\n210000., 0.3\n*DENSITY\n7.85e-9\n"
+FORCE = 1.0
+MASS = 1e-3
+PLANE = 1e-5  # of the height: how near a node of a plane lies
+
+
+def percent(text):
+    return float(text.rstrip("%")) / 100 if text.endswith("%") else float(text)
+
+
+def length(text):
+    """A length as a recipe takes it."""
+    return f'"{text}"' if text.endswith("%") else text
+
+
+def recipe(part, share, arguments):
+    """Repair, then simplify, or nothing, or for the reference cut every face into four."""
+    steps = [f'name = "fe-check"\n[inputs]\npart = "{part}"', '[steps.raw]\nuse = "read"\nfile = "=inputs.part"',
+             '[steps.clean]\nuse = "repair"\nfrom = "raw"']
+    last = "clean"
+    if share is None:
+        steps.append('[steps.fine]\nuse = "subdivide"\nfrom = "clean"\ntimes = 1')
+        last = "fine"
+    elif share > 0:
+        steps.append('[steps.marked]\nuse = "features"\nfrom = "clean"\nangle = 30')
+        steps.append('[steps.light]\nuse = "simplify-fit"\nfrom = "marked"\nreference = "clean"\n'
+                     f'remove = {share}\ntolerance = {length(arguments.tolerance)}')
+        last = "light"
+    steps.append(f'[outputs]\n{last} = [{{ file = "mesh.inp", element = "S6", midside-on = "clean" }}]')
+    return "\n\n".join(steps) + "\n"
+
+
+def mesh(folder, share, arguments):
+    path = os.path.join(folder, "recipe.toml")
+    with open(path, "w", encoding="utf-8") as file:
+        file.write(recipe(os.path.abspath(arguments.part), share, arguments))
+    out = os.path.join(folder, "out")
+    command = [os.path.abspath(arguments.meshmill), "run", path, "--out", out, "-q"]
+    done = subprocess.run(command, capture_output=True, text=True,
+                          env={**os.environ, "MESHMILL_CACHE": os.path.join(arguments.work, "cache")})
+    if done.returncode:
+        sys.exit(f"{' '.join(command)}\n{done.stdout[-2000:]}\n{done.stderr[-2000:]}")
+    return os.path.join(out, "mesh.inp")
+
+
+def read(path):
+    """Nodes and elements of a deck of quadratic triangles."""
+    nodes, elements, section = {}, {}, None
+    with open(path, encoding="utf-8") as file:
+        for line in file:
+            if line.startswith("**"):
+                continue
+            if line.startswith("*"):
+                keyword = line.split(",")[0].strip().upper()
+                section = {"*NODE": nodes, "*ELEMENT": elements}.get(keyword)
+                if keyword == "*ELEMENT" and "S6" not in line.upper():
+                    sys.exit(f"{path}: {line.strip()} is no quadratic triangle")
+                continue
+            if section is None or not line.strip():
+                continue
+            numbers = line.replace(",", " ").split()
+            if section is nodes:
+                nodes[int(numbers[0])] = tuple(map(float, numbers[1:4]))
+            else:
+                elements[int(numbers[0])] = tuple(map(int, numbers[1:]))
+    return nodes, elements
+
+
+def planes(nodes):
+    """The nodes of the lowest and of the highest plane: by where they lie, so that every mesh has the same."""
+    low = min(p[2] for p in nodes.values())
+    high = max(p[2] for p in nodes.values())
+    near = PLANE * (high - low)
+    return ([n for n, p in sorted(nodes.items()) if p[2] - low <= near],
+            [n for n, p in sorted(nodes.items()) if high - p[2] <= near])
+
+
+def deck(nodes, elements, thickness, analysis):
+    """The foot is held; the lid is a stiff body that moves without turning: one node, tied by equations."""
+    foot, lid = planes(nodes)
+    master = max(nodes) + 1
+    text = ["*NODE, NSET=ALL\n"]
+    text += [f"{n}, {x:.12g}, {y:.12g}, {z:.12g}\n" for n, (x, y, z) in sorted(nodes.items())]
+    text += ["*NODE, NSET=LID\n", f"{master}, 0., 0., {2 * max(p[2] for p in nodes.values()) + 1:.12g}\n"]
+    text.append("*ELEMENT, TYPE=S6, ELSET=SHELL\n")
+    text += [f"{e}, " + ", ".join(map(str, corners)) + "\n" for e, corners in sorted(elements.items())]
+    text.append(f"*ELEMENT, TYPE=MASS, ELSET=DEVICE\n{max(elements) + 1}, {master}\n*MASS, ELSET=DEVICE\n{MASS}\n")
+    text += [STEEL, f"*SHELL SECTION, ELSET=SHELL, MATERIAL=STEEL\n{thickness:.9g}\n", "*NSET, NSET=FOOT\n"]
+    text += [f"{n},\n" for n in foot]
+    text.append("*BOUNDARY\nFOOT, 1, 3\n")
+    text += [f"*EQUATION\n2\n{n}, {axis}, 1., {master}, {axis}, -1.\n" for n in lid for axis in (1, 2, 3)]
+    if analysis == "static":
+        load = "".join(f"{master}, {axis}, {FORCE}\n" for axis in (1, 2, 3))
+        text.append(f"*STEP\n*STATIC\n*CLOAD\n{load}*NODE PRINT, NSET=LID\nU\n*END STEP\n")
+    else:
+        text.append("*STEP\n*FREQUENCY\n3\n*END STEP\n")
+    return "".join(text)
+
+
+def solve(folder, name, text):
+    """Runs CalculiX; it exits with 0 even when it fails, so its output is searched. Gives the results and CPU seconds."""
+    results = os.path.join(folder, name + ".dat")
+    if os.path.exists(results):
+        os.remove(results)
+    with open(os.path.join(folder, name + ".inp"), "w", encoding="utf-8") as file:
+        file.write(text)
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    done = subprocess.run(["ccx", "-i", name], cwd=folder, capture_output=True, text=True,
+                          env={**os.environ, "OMP_NUM_THREADS": "1"})
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    if "*ERROR" in done.stdout + done.stderr or not os.path.exists(results) or not os.path.getsize(results):
+        sys.exit(f"{folder}/{name}: the analysis failed\n{done.stdout[-2000:]}")
+    with open(results, encoding="utf-8") as file:
+        return file.read(), after.ru_utime - before.ru_utime
+
+
+def displacement(text):
+    """Of the lid, along the three axes."""
+    for line in text.splitlines():
+        part = line.split()
+        if len(part) == 4 and part[0].isdigit():
+            return [float(x) for x in part[1:]]
+    sys.exit("no displacement was printed")
+
+
+def frequencies(text):
+    found = [float(line.split()[3]) for line in text.splitlines() if re.match(r"\s+[123]\s+-?[0-9.]+E", line)]
+    if len(found) < 3:
+        sys.exit("no frequencies were printed")
+    return found[:3]
+
+
+def case(share, arguments):
+    name = "reference" if share is None else f"removed-{100 * share:g}"
+    folder = os.path.join(arguments.work, name)
+    os.makedirs(folder, exist_ok=True)
+    nodes, elements = read(mesh(folder, share, arguments))
+    box = [max(p[a] for p in nodes.values()) - min(p[a] for p in nodes.values()) for a in range(3)]
+    # From the reference, so that all cases have the same.
+    arguments.diagonal = arguments.diagonal or sum(side * side for side in box) ** 0.5
+    thickness = percent(arguments.thickness) * arguments.diagonal
+    text, static_time = solve(folder, "static", deck(nodes, elements, thickness, "static"))
+    moved = displacement(text)
+    text, modal_time = solve(folder, "modal", deck(nodes, elements, thickness, "modal"))
+    return {"share": share, "faces": len(elements), "displacement": moved, "compliance": sum(moved) / FORCE,
+            "nodes": len(nodes), "frequencies": frequencies(text),
+            "static_seconds": static_time, "modal_seconds": modal_time}
+
+
+def errors(row, reference):
+    """Signed errors: of the compliance, and the largest of the three frequencies."""
+    by_mode = [f / g - 1 for f, g in zip(row["frequencies"], reference["frequencies"])]
+    return row["compliance"] / reference["compliance"] - 1, max(by_mode, key=abs)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--meshmill", required=True)
+    parser.add_argument("--part", required=True)
+    parser.add_argument("--shares", default="0,20,35,50,68,75")
+    parser.add_argument("--tolerance", default="0.1%")
+    parser.add_argument("--thickness", default="0.01%")
+    parser.add_argument("--most-error", default="2%")
+    parser.add_argument("--work")
+    parser.add_argument("--json")
+    arguments = parser.parse_args()
+    if not shutil.which("ccx"):
+        sys.exit("CalculiX is missing: apt-get install calculix-ccx")
+    arguments.work = arguments.work or tempfile.mkdtemp(prefix="fe-check-")
+    arguments.diagonal = None
+    reference = case(None, arguments)
+    rows, failed, dense = [reference], False, None
+    print("| removed | faces | compliance | error | frequency 1 | worst error of 3 | static s | modal s | faster |")
+    print("|---|---|---|---|---|---|---|---|---|")
+    for share in [float(share) / 100 for share in arguments.shares.split(",")]:
+        row = case(share, arguments)
+        rows.append(row)
+        dense = dense or row
+        row["errors"] = errors(row, reference)
+        total = row["static_seconds"] + row["modal_seconds"]
+        gain = (dense["static_seconds"] + dense["modal_seconds"]) / max(total, 1e-3)
+        missed = dense["share"] == 0 and row["faces"] > dense["faces"] * (1 - share) + 1
+        worst, own = (max(map(abs, r["errors"])) for r in (row, dense))
+        failed |= missed or worst > max(percent(arguments.most_error), own)
+        print(f"| {100 * share:g} % | {row['faces']} | {row['compliance']:.5g} | {100 * row['errors'][0]:+.2f} % | "
+              f"{row['frequencies'][0]:.5g} | {100 * row['errors'][1]:+.2f} % | {row['static_seconds']:.1f} | "
+              f"{row['modal_seconds']:.1f} | {gain:.1f} |{' missed' if missed else ''}", flush=True)
+    print(f"\nreference: {reference['faces']} faces, compliance {reference['compliance']:.5g}, "
+          f"frequencies {', '.join(f'{f:.5g}' for f in reference['frequencies'])}; "
+          f"{reference['static_seconds']:.1f} s, {reference['modal_seconds']:.1f} s")
+    if arguments.json:
+        with open(arguments.json, "w", encoding="utf-8") as file:
+            json.dump(rows, file, indent=1)
+    return int(failed)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
