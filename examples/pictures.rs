@@ -1,8 +1,9 @@
-//! Regions and their curves as files to look at: `pictures [--flip] MESH FOLDER`.
+//! From regions to quads in pictures: `pictures [--flip] MESH FOLDER`.
 //!
-//! Repairs the mesh, marks its features, partitions it, straightens the borders and cuts along them. Writes
-//! `regions.vtu` (the mesh as it was, with the number of each face's region), `split.vtu` (the mesh cut along the curves)
-//! and `curves.obj` (the curves as polylines), and prints what each step says of itself.
+//! Repairs the mesh, marks its features, partitions it, straightens the borders, cuts along them and makes quads, all with
+//! default parameters but the size of 3 %. Writes `regions.png` (the mesh as it was, each region in a colour), `split.png`
+//! (cut along the curves, which are drawn bold), `quads.png` (by scaled Jacobian, blue is a square) and `quad-regions.png`,
+//! the same four as VTU, and `curves.obj` (the curves as polylines); prints what each step says of itself.
 #![expect(clippy::print_stdout, reason = "the statistics are to be read")]
 
 use std::error::Error;
@@ -11,8 +12,11 @@ use std::path::Path;
 
 use meshmill::format::{self, Format, WriteOptions};
 use meshmill::mesh::{Surface, SurfacePoint};
+use meshmill::report::picture;
+use meshmill::step::Length;
 use meshmill::steps::features::{FeaturesParams, features};
 use meshmill::steps::partition::{PartitionParams, partition};
+use meshmill::steps::q_morph::{QMorphParams, q_morph};
 use meshmill::steps::repair::{RepairParams, repair};
 use meshmill::steps::split::{SplitParams, split};
 use meshmill::steps::straighten::{Method, StraightenParams, straighten};
@@ -64,10 +68,21 @@ fn main() -> Result<(), Box<dyn Error>> {
     let (cut, stats) = split(&curves, &SplitParams::default(), &watch)?;
     told("split", &stats)?;
     std::fs::create_dir_all(folder)?;
-    for (name, surface) in [("regions.vtu", &parts), ("split.vtu", &cut)] {
-        let bytes = format::write(Format::Vtu, &surface.to_soup(), &WriteOptions::default())?;
-        std::fs::write(folder.join(name), bytes)?;
-    }
     std::fs::write(folder.join("curves.obj"), lines(&curves))?;
+    let wanted = QMorphParams { size: Length::Percent(3.0).into(), ..QMorphParams::default() };
+    let (quads, stats) = q_morph(&cut, &wanted, &watch)?;
+    told("q-morph", &stats)?;
+    let (parts, cut) = (parts.to_soup(), cut.to_soup());
+    for (name, mesh, by_region) in [
+        ("regions", &parts, true),
+        ("split", &cut, true),
+        ("quads", &quads.mesh, false),
+        ("quad-regions", &quads.mesh, true),
+    ] {
+        let draw = if by_region { picture::regions_png } else { picture::png };
+        std::fs::write(folder.join(format!("{name}.png")), draw(mesh, [1200, 900], "meshmill pictures")?)?;
+        let bytes = format::write(Format::Vtu, mesh, &WriteOptions::default())?;
+        std::fs::write(folder.join(format!("{name}.vtu")), bytes)?;
+    }
     Ok(())
 }

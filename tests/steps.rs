@@ -22,6 +22,7 @@ mod steps {
     mod measure;
     mod partition;
     mod q_morph;
+    mod q_morph_shapes;
     mod read;
     mod refine;
     mod remove_features;

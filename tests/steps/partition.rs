@@ -19,7 +19,7 @@ fn marked(mesh: &meshmill::mesh::Soup) -> Artifact {
 }
 
 /// A tube of radius 1 and height 2 with half spheres as ends: `n` sides round, `m` rings in each end.
-fn capsule(n: usize, m: usize) -> meshmill::mesh::Soup {
+pub(super) fn capsule(n: usize, m: usize) -> meshmill::mesh::Soup {
     let rings = 2 * m + 4;
     let mut mesh = shapes::cylinder(n, rings - 2);
     for p in &mut mesh.points {

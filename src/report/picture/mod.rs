@@ -19,7 +19,7 @@ use glam::DVec3;
 
 use crate::mesh::geometry;
 use crate::mesh::topology::EdgeTable;
-use crate::mesh::{Facet, Soup, VertexId, edge_key};
+use crate::mesh::{FaceId, Facet, Soup, VertexId, edge_key};
 use crate::metric::quad_shape::quad_shape;
 use camera::Camera;
 use paint::{Canvas, Patch};
@@ -34,7 +34,30 @@ const LEAST_EDGE: f64 = 6.0;
 /// # Errors
 /// When the picture has no pixel.
 pub fn png(mesh: &Soup, [width, height]: [u32; 2], note: &str) -> Result<Vec<u8>, png::EncodingError> {
-    let pixels = draw(mesh, [width as usize, height as usize]);
+    encode(&draw(mesh, [width as usize, height as usize]), [width, height], note)
+}
+
+/// As [`png`], coloured by region instead of quality; faces of neighbouring numbers differ most.
+///
+/// # Errors
+/// When the picture has no pixel.
+pub fn regions_png(mesh: &Soup, [width, height]: [u32; 2], note: &str) -> Result<Vec<u8>, png::EncodingError> {
+    let labels = mesh.carried.regions.as_ref().map(|regions| &regions.labels);
+    let colour = |face: FaceId| hue(labels.and_then(|l| l.get(face)).copied().unwrap_or(0));
+    encode(&draw_by(mesh, [width as usize, height as usize], colour), [width, height], note)
+}
+
+/// One of many colours that are easy to tell apart: steps of the golden section round the colour circle.
+fn hue(label: u32) -> [f64; 3] {
+    let turn = (f64::from(label) * 0.618_033_988_749_894_9).fract();
+    let part = |shift: f64| {
+        let t = ((turn + shift).fract() * 6.0 - 3.0).abs() - 1.0;
+        90.0 + 150.0 * t.clamp(0.0, 1.0)
+    };
+    [part(0.0), part(2.0 / 3.0), part(1.0 / 3.0)]
+}
+
+fn encode(pixels: &[u8], [width, height]: [u32; 2], note: &str) -> Result<Vec<u8>, png::EncodingError> {
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, width, height);
     encoder.set_color(png::ColorType::Rgba);
@@ -42,23 +65,28 @@ pub fn png(mesh: &Soup, [width, height]: [u32; 2], note: &str) -> Result<Vec<u8>
     encoder.set_compression(png::Compression::High);
     encoder.add_text_chunk("Software".to_owned(), note.to_owned())?;
     let mut writer = encoder.write_header()?;
-    writer.write_image_data(&pixels)?;
+    writer.write_image_data(pixels)?;
     writer.finish()?;
     Ok(bytes)
 }
 
 /// Draws a mesh: four bytes a pixel, row by row from above.
-pub fn draw(mesh: &Soup, [width, height]: [usize; 2]) -> Vec<u8> {
+pub fn draw(mesh: &Soup, size: [usize; 2]) -> Vec<u8> {
+    draw_by(mesh, size, |face| ramp::colour(&ramp::QUALITY, quality(mesh, &mesh.faces[face])))
+}
+
+/// The same with a colour (sRGB bytes) for each face.
+fn draw_by(mesh: &Soup, [width, height]: [usize; 2], colour_of: impl Fn(FaceId) -> [f64; 3]) -> Vec<u8> {
     let mut canvas = Canvas::new(width * SAMPLES, height * SAMPLES);
     let used = mesh.faces.iter().flat_map(Facet::corners).map(|&v| mesh.points[v]);
     let camera = Camera::isometric(used, [canvas.width as f64, canvas.height as f64]);
     let projected: Vec<DVec3> = mesh.points.iter().map(|&p| camera.project(p)).collect();
     let bold = bold_edges(mesh);
     let draw_edges = mean_edge(mesh, &projected) >= LEAST_EDGE * SAMPLES as f64;
-    for facet in &mesh.faces {
+    for (face, facet) in mesh.faces.enumerate() {
         let corners = facet.corners();
         let normal = camera.turn(normal(mesh, corners));
-        let colour = shade(quality(mesh, facet), normal);
+        let colour = shade(colour_of(face), normal);
         let side = |a: usize, b: usize| {
             let is_bold = bold.contains(&edge_key(corners[a], corners[b]));
             if is_bold {
@@ -121,11 +149,11 @@ fn quality(mesh: &Soup, facet: &Facet) -> f64 {
     }
 }
 
-/// The colour of a face with this quality and this normal, seen along z.
-fn shade(quality: f64, normal: DVec3) -> [f64; 3] {
+/// The colour of a face with this normal, seen along z.
+fn shade(colour: [f64; 3], normal: DVec3) -> [f64; 3] {
     // A little light from the upper left keeps cylinders from looking flat.
     let light = 0.45 + 0.45 * normal.z.abs() + 0.1 * (normal.y - 0.6 * normal.x) * normal.z.signum();
-    ramp::colour(&ramp::QUALITY, quality).map(|c| (0.88 * c + 30.0) * light)
+    colour.map(|c| (0.88 * c + 30.0) * light)
 }
 
 #[cfg(test)]

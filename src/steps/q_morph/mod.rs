@@ -12,8 +12,12 @@
 //! feature edges; S. J. Owen, M. L. Staten, S. A. Canann, S. Saigal. Advancing front quadrilateral meshing using triangle
 //! transformations. 7th International Meshing Roundtable, 1998.
 //!
+//! Then the distance between quads and surface is certified both ways; where it is larger than `tolerance`, sizes are
+//! lowered and the front runs again.
+//!
 //! # Invariants
-//! - Curves stay chains of edges between the same nodes, and nodes stay where they are.
+//! - Curves stay chains of edges between the same nodes, and nodes stay where they are; borders of regions that
+//!   `border-angle` speaks against are no curves, and their ends no nodes.
 //! - With `all-quad` there is no triangle; without, at most one in each region.
 //! - The Euler characteristic and the number of rims stay.
 //!
@@ -25,12 +29,12 @@
 //! the quads even. Where the paper leaves a triangle to keep a curve, the parity of the borders makes that unnecessary.
 
 mod carry;
+mod check;
 mod midpoint;
 mod sizes;
 
 use std::sync::Arc;
 
-use glam::DVec3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -40,18 +44,18 @@ use crate::step::{
     Artifact, FailureKind, InputDef, Inputs, Length, Locks, OutPort, OutputDef, Port, Produced, Sizing,
     Step as StepContract, StepFailure,
 };
-use crate::technique::clean_quads::{census, clean};
+use crate::technique::clean_quads::{census, clean, finish};
 use crate::technique::front::advance;
-use crate::technique::ground::Ground;
-use crate::technique::isotropic::{Rules, pair_up, polish, remesh, tighten};
+use crate::technique::ground::{Choice, Ground};
+use crate::technique::isotropic::{Rules, curve_distance, pair_up, polish, remesh, tighten};
 use crate::technique::join::{join_along_paths, join_neighbours};
 use crate::technique::mixed::Mixed;
 use crate::watch::{Cancelled, Watch};
 
+use check::Check;
+
 /// How often sizes are lowered where the quads prove too far from the surface.
-const ATTEMPTS: usize = 4;
-/// The part of the tolerance that middles of edges and diagonals may use.
-const SHARE: f64 = 0.85;
+const ATTEMPTS: usize = 5;
 
 /// Turns a surface into quads of a given size that follow its marked curves.
 ///
@@ -66,7 +70,8 @@ pub struct QMorphParams {
     /// Range 0 to 360.
     #[schemars(range(min = 0.0, max = 360.0))]
     pub size_curvature: f64,
-    /// Sizes are not lowered below this, except where nodes are closer. Length; default a quarter of the least `size`.
+    /// Sizes are not lowered below this, except where nodes are closer. Length; default a quarter of the least `size`, and
+    /// a sixteenth where the distance needs it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub min_size: Option<Length>,
     /// How much longer edges may get over a unit of length. Range 0.05 to 2, default 0.3.
@@ -76,6 +81,10 @@ pub struct QMorphParams {
     pub tolerance: Length,
     /// Distance from the curves that sizes on them are chosen for. Length, default 0.1 %.
     pub curve_tolerance: Length,
+    /// Borders of regions that meet another curve at less than this angle, or leave no room for an edge, are not
+    /// followed; marked edges and borders of groups always are. Degrees, default 30; 0 follows all. Range 0 to 90.
+    #[schemars(range(min = 0.0, max = 90.0))]
+    pub border_angle: f64,
     /// Whether there must be no triangle. Default true; false leaves one in each region with an odd number of border
     /// edges, and no curve gets an edge more for it.
     pub all_quad: bool,
@@ -93,6 +102,7 @@ impl Default for QMorphParams {
             gradation: 0.3,
             tolerance: Length::Percent(0.3),
             curve_tolerance: Length::Percent(0.1),
+            border_angle: 30.0,
             all_quad: true,
             max_faces: 20_000_000,
         }
@@ -112,6 +122,8 @@ pub struct QMorphStats {
     /// Regions by what they needed: the front alone; neighbours joined; triangles joined along paths; one midpoint
     /// split of everything.
     pub regions_by_level: [usize; 4],
+    /// Borders of regions that were not followed.
+    pub left_out: usize,
     /// Edges of curves that were halved so that each region has an even number of them.
     pub parity_splits: usize,
     /// Wedges of the front that were seamed.
@@ -124,6 +136,13 @@ pub struct QMorphStats {
     pub mean_scaled_jacobian: f64,
     /// Share of vertices off the rims that have four edges.
     pub regular_share: f64,
+    /// How often sizes were lowered and the front run again because of the distance, and once more.
+    pub attempts: usize,
+    /// The largest distance between quads and surface, certified both ways. Larger than `tolerance` where sizes must not
+    /// get small enough.
+    pub distance: f64,
+    /// The largest distance between a curve and the edges on it.
+    pub curve_distance: f64,
     /// Faces that are inverted or flat, with their middles; none in a sound result.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub inverted: Vec<InvertedFace>,
@@ -188,21 +207,26 @@ pub fn q_morph(surface: &Surface, params: &QMorphParams, watch: &Watch) -> Resul
         return Err(QMorphError::Empty);
     }
     let diagonal = Aabb::of(surface.points.iter().copied()).diagonal();
-    let rules = rules(surface, params, diagonal)?;
-    let ground = Ground::new(surface);
+    let (rules, size) = rules(surface, params, diagonal)?;
+    let angle = params.border_angle.clamp(0.0, 90.0).to_radians();
+    let choice = Choice { angle, reach: 0.5 * size, gap: 0.25 * size };
+    let ground = Ground::following(surface, (angle > 0.0).then_some(&choice));
     let (mut mesh, mut stats) = morph(&ground, params, rules, 1.0, watch)?;
     if params.all_quad && stats.triangles > 0 {
         // A region without a partner for its last triangle: quads of double size, each cut into four.
         (mesh, stats) = morph(&ground, params, rules, 2.0, watch)?;
         mesh = midpoint::split_all(&mesh, &ground).ok_or(QMorphError::NotManifold)?;
         stats.regions_by_level = [0, 0, 0, ground.region_count()];
-        stats.clean_edits += clean(&mut mesh, &ground, watch)?.edits;
+        stats.clean_edits += clean(&mut mesh, &ground, rules.curve_tolerance, watch)?.edits;
+        stats.clean_edits += finish(&mut mesh, &ground, rules.curve_tolerance, watch)?.edits;
     }
+    stats.curve_distance = curve_distance(&mesh, &ground);
     judge(&mesh, &mut stats);
     Ok((Quads { mesh: carry::leave(&mesh, &ground), cover: None }, stats))
 }
 
-fn rules(surface: &Surface, params: &QMorphParams, diagonal: f64) -> Result<Rules, QMorphError> {
+/// The rules, and the least size.
+fn rules(surface: &Surface, params: &QMorphParams, diagonal: f64) -> Result<(Rules, f64), QMorphError> {
     let least = params.size.resolve(surface, diagonal).map_err(QMorphError::Size)?.least();
     let positive = |name, value: f64| {
         if value > 0.0 && value.is_finite() { Ok(value) } else { Err(QMorphError::NotPositive(name, value)) }
@@ -211,6 +235,7 @@ fn rules(surface: &Surface, params: &QMorphParams, diagonal: f64) -> Result<Rule
         tolerance: positive("tolerance", params.tolerance.resolve(diagonal))?,
         curve_tolerance: positive("curve-tolerance", params.curve_tolerance.resolve(diagonal))?,
         least_size: params.min_size.map_or(0.25 * least, |length| length.resolve(diagonal)),
+        floor: params.min_size.map_or(least / 16.0, |length| length.resolve(diagonal)),
         gradation: params.gradation.clamp(0.05, 2.0),
     };
     positive("size", least)?;
@@ -220,7 +245,7 @@ fn rules(surface: &Surface, params: &QMorphParams, diagonal: f64) -> Result<Rule
     if faces > params.max_faces as f64 {
         return Err(QMorphError::TooManyFaces(faces as usize, params.max_faces));
     }
-    Ok(rules)
+    Ok((rules, least))
 }
 
 /// One run from the surface to clean quads, with all sizes times `scale`.
@@ -231,21 +256,40 @@ fn morph(
     scale: f64,
     watch: &Watch,
 ) -> Result<(Mixed, QMorphStats), QMorphError> {
-    let mut stats = QMorphStats { regions: ground.region_count(), ..QMorphStats::default() };
+    let mut stats = QMorphStats { regions: ground.region_count(), left_out: ground.left_out, ..QMorphStats::default() };
     let mut mesh = ground.workshop().ok_or(QMorphError::NotManifold)?;
     sizes::set(&mut mesh, ground.surface, params, scale).map_err(QMorphError::Size)?;
     watch.phase("remeshing between the curves", None);
     remesh(&mut mesh, ground, rules, watch)?;
-    for attempt in 0..ATTEMPTS {
-        let triangles = mesh.clone();
-        advance_and_clean(&mut mesh, ground, params, rules, &mut stats, watch)?;
-        let far = far_faces(&mesh, ground, rules.tolerance);
-        if far.is_empty() || attempt + 1 == ATTEMPTS {
+    let check = Check::new(ground.surface);
+    let mut best: Option<((usize, f64), Mixed, QMorphStats)> = None;
+    for attempt in 1..=ATTEMPTS {
+        let mut quads = mesh.clone();
+        let mut now = QMorphStats { attempts: attempt, ..stats.clone() };
+        advance_and_clean(&mut quads, ground, params, rules, &mut now, watch)?;
+        let mut found = check.beyond(&quads, rules.tolerance, watch)?;
+        if found.places.is_empty() || attempt == ATTEMPTS {
+            now.clean_edits += finish(&mut quads, ground, rules.curve_tolerance, watch)?.edits;
+            found = check.beyond(&quads, rules.tolerance, watch)?;
+        }
+        let score = (found.places.len(), found.worst);
+        if best.as_ref().is_none_or(|(least, ..)| score < *least) {
+            best = Some((score, quads, now));
+        }
+        stats.attempts = attempt;
+        if found.places.is_empty() {
             break;
         }
-        mesh = triangles;
-        tighten(&mut mesh, ground, rules, &far, watch)?;
+        tighten(&mut mesh, ground, rules, &found.places, watch)?;
     }
+    if let Some((_, quads, now)) = best {
+        mesh = quads;
+        if now.attempts < stats.attempts {
+            finish(&mut mesh, ground, rules.curve_tolerance, watch)?;
+        }
+        stats = QMorphStats { attempts: stats.attempts, ..now };
+    }
+    stats.distance = check.distance(&mesh, watch)?;
     stats.triangles = mesh.census().0;
     Ok((mesh, stats))
 }
@@ -275,26 +319,8 @@ fn advance_and_clean(
         stats.regions_by_level[level] += 1;
     }
     watch.phase("cleaning up", None);
-    stats.clean_edits = clean(mesh, ground, watch)?.edits;
+    stats.clean_edits = clean(mesh, ground, rules.curve_tolerance, watch)?.edits;
     Ok(())
-}
-
-/// Where faces leave the surface by more than the tolerance: their middle, their reach, and the size that would do.
-fn far_faces(mesh: &Mixed, ground: &Ground<'_>, tolerance: f64) -> Vec<(DVec3, f64, f64)> {
-    let mut far = Vec::new();
-    for f in mesh.faces() {
-        let corners: Vec<DVec3> = mesh.corners(f).iter().map(|&v| mesh.point(v)).collect();
-        let n = corners.len();
-        let between = |i: usize, j: usize| 0.5 * (corners[i % n] + corners[j % n]);
-        let samples = (0..n).map(|i| between(i, i + 1)).chain([between(0, 2), between(1, 3)]);
-        let off = samples.map(|p| ground.project(mesh.region(f), p).distance_squared).fold(0.0, f64::max).sqrt();
-        if off > SHARE * tolerance {
-            let length = mesh.sides(f).map(|h| mesh.length(h)).sum::<f64>() / n as f64;
-            let factor = (0.7 * tolerance / off).sqrt().clamp(0.5, 0.85);
-            far.push((mesh.centre(f), 1.2 * length, factor * length));
-        }
-    }
-    far
 }
 
 fn triangles_by_region(mesh: &Mixed, regions: usize) -> Vec<usize> {
@@ -332,7 +358,7 @@ pub struct Step;
 
 impl StepContract for Step {
     const NAME: &'static str = "q-morph";
-    const REVISION: u32 = 1;
+    const REVISION: u32 = 2;
     const INPUTS: &'static [InputDef] = &[InputDef {
         name: "from",
         accepts: &[Port::Surface],

@@ -33,13 +33,13 @@ impl Cleaner<'_, '_> {
         let mut kinds: Vec<(f64, usize, Kind)> = Vec::new();
         for (i, kind) in self.kinds(v).into_iter().enumerate() {
             if let Some(gain) = self.gain(kind)
-                && gain >= 0.0
+                && gain >= if self.is_rescue { -12.0 } else { 0.0 }
             {
                 kinds.push((gain, i, kind));
             }
         }
         kinds.sort_by(|x, y| y.0.total_cmp(&x.0).then(x.1.cmp(&y.1)));
-        kinds.into_iter().take(8).any(|(_, _, kind)| self.attempt(kind))
+        kinds.into_iter().take(if self.is_rescue { 24 } else { 8 }).any(|(_, _, kind)| self.attempt(kind))
     }
 
     fn kinds(&self, v: u32) -> Vec<Kind> {
@@ -323,11 +323,17 @@ impl Cleaner<'_, '_> {
             self.centre_between(kept);
         }
         self.relax(&touched, 3);
+        if self.is_rescue {
+            self.search_at(&touched);
+        }
         let after = self.judge(&touched);
         let fewer = after.0 < before.0 - 1e-9;
         let good = after.1 >= GOOD || after.1 > before.1;
         let better = after.0 < before.0 + 1e-9 && before.1 < GOOD && after.1 > before.1 + 0.05;
-        if (fewer && good) || better {
+        // A face that is no use at all is worth any valence, a poor one a few.
+        let price = if before.1 < 0.2 { 12.0 } else { 4.0 };
+        let rescued = self.is_rescue && after.1 > before.1 + 0.05 && after.0 < before.0 + price;
+        if (!self.is_rescue && ((fewer && good) || better)) || rescued {
             self.mesh.commit();
             true
         } else {

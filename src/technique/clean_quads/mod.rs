@@ -31,6 +31,11 @@ pub use valence::{Census, census};
 /// A cleaned neighbourhood must be at least this good, or better than before.
 const GOOD: f64 = 0.35;
 
+/// Faces below this are worth edits that make valences worse.
+const POOR: f64 = 0.5;
+/// Rounds of such edits.
+const RESCUES: usize = 3;
+
 /// What was done.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct CleanReport {
@@ -44,11 +49,21 @@ pub struct CleanReport {
 struct Cleaner<'a, 'g> {
     mesh: &'a mut Mixed,
     ground: &'a Ground<'g>,
+    /// How far edges may leave their curve when vertices slide along it.
+    curve_tolerance: f64,
+    /// Whether shape counts more than valences.
+    is_rescue: bool,
 }
 
-/// Cleans the topology, then optimises the shapes.
-pub fn clean(mesh: &mut Mixed, ground: &Ground<'_>, watch: &Watch) -> Result<CleanReport, Cancelled> {
-    let mut cleaner = Cleaner { mesh, ground };
+/// Cleans the topology, then optimises the shapes a little; [`finish`] goes on. Vertices slide along curves within
+/// `curve_tolerance` of them.
+pub fn clean(
+    mesh: &mut Mixed,
+    ground: &Ground<'_>,
+    curve_tolerance: f64,
+    watch: &Watch,
+) -> Result<CleanReport, Cancelled> {
+    let mut cleaner = Cleaner { mesh, ground, curve_tolerance, is_rescue: false };
     let mut report = CleanReport::default();
     cleaner.relax_all(2);
     for pass in 0..8 {
@@ -61,9 +76,30 @@ pub fn clean(mesh: &mut Mixed, ground: &Ground<'_>, watch: &Watch) -> Result<Cle
         }
     }
     cleaner.mesh.compact();
-    let mut cleaner = Cleaner { mesh, ground };
+    let mut cleaner = Cleaner { mesh, ground, curve_tolerance, is_rescue: false };
     cleaner.relax_all(6);
-    report.rounds = cleaner.optimise(12, watch)?;
+    report.rounds = cleaner.optimise(3, watch)?;
+    Ok(report)
+}
+
+/// Optimises the shapes of clean quads to the end, and mends poor ones at the price of regular vertices.
+pub fn finish(
+    mesh: &mut Mixed,
+    ground: &Ground<'_>,
+    curve_tolerance: f64,
+    watch: &Watch,
+) -> Result<CleanReport, Cancelled> {
+    let mut cleaner = Cleaner { mesh, ground, curve_tolerance, is_rescue: false };
+    let mut report = CleanReport { edits: 0, rounds: cleaner.optimise(12, watch)? };
+    cleaner.is_rescue = true;
+    for _ in 0..RESCUES {
+        let rescued = cleaner.rescue();
+        if rescued == 0 {
+            break;
+        }
+        report.edits += rescued;
+        report.rounds += cleaner.optimise(4, watch)?;
+    }
     Ok(report)
 }
 
@@ -89,6 +125,26 @@ impl Cleaner<'_, '_> {
         let mut edits = 0;
         while self.mesh.is_vertex(v) && edits < 4 && self.best_edit(v) {
             edits += 1;
+        }
+        edits
+    }
+
+    /// Edits at the corners of poor faces, the worst first. Returns the number of edits.
+    fn rescue(&mut self) -> usize {
+        let quality = |f: u32| (self.mesh.quality(f), f);
+        let mut poor: Vec<(f64, u32)> = self.mesh.faces().map(quality).filter(|&(q, _)| q < POOR).collect();
+        poor.sort_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
+        let mut edits = 0;
+        for (_, f) in poor {
+            if !self.mesh.is_face(f) || self.mesh.is_triangle(f) || self.mesh.quality(f) >= POOR {
+                continue;
+            }
+            for v in self.mesh.corners(f) {
+                if self.mesh.is_vertex(v) && self.best_edit(v) {
+                    edits += 1;
+                    break;
+                }
+            }
         }
         edits
     }

@@ -114,6 +114,24 @@ impl Cleaner<'_, '_> {
         }
     }
 
+    /// Better places for these vertices, two rounds.
+    pub(super) fn search_at(&mut self, vertices: &[u32]) {
+        for _ in 0..2 {
+            for &v in vertices {
+                self.better_place(v);
+            }
+        }
+    }
+
+    /// Whether a vertex found a better place.
+    fn better_place(&mut self, v: u32) -> bool {
+        match self.mesh.place(v) {
+            Place::Node => false,
+            Place::Arc { arc, at } => self.slide(v, arc, at),
+            Place::Region(region) => self.search(v, region),
+        }
+    }
+
     /// Smoothing of all vertices.
     pub(super) fn relax_all(&mut self, rounds: usize) {
         let all: Vec<u32> = self.mesh.vertices().collect();
@@ -131,12 +149,7 @@ impl Cleaner<'_, '_> {
                 if !std::mem::replace(&mut active[v as usize], false) {
                     continue;
                 }
-                let changed = match self.mesh.place(v) {
-                    Place::Node => false,
-                    Place::Arc { arc, at } => self.slide(v, arc, at),
-                    Place::Region(region) => self.search(v, region),
-                };
-                if changed {
+                if self.better_place(v) {
                     moved += 1;
                     active[v as usize] = true;
                     for f in self.mesh.faces_at(v) {
@@ -205,13 +218,16 @@ impl Cleaner<'_, '_> {
         let star = self.star(v, DVec3::ZERO);
         let first = star.cost(self.mesh.point(v));
         let reach = self.reach(v);
+        let beside: SmallVec<[f64; 2]> = self.beside_on(v, arc, at);
+        let sag = |p: f64| beside.iter().map(|&q| curve.sag(p.min(q), p.max(q))).fold(0.0, f64::max);
+        let most = sag(at).max(self.curve_tolerance);
         let (mut best, mut cost) = (at, first);
         let mut step = 0.1 * reach;
         while step > 0.01 * reach {
             let before = cost;
             for p in [best - step, best + step] {
                 let c = star.cost(curve.at(p));
-                if c < cost && p > 0.0 && p < curve.length() && (p - at).abs() < 0.3 * reach {
+                if c < cost && p > 0.0 && p < curve.length() && (p - at).abs() < 0.3 * reach && sag(p) <= most {
                     (best, cost) = (p, c);
                 }
             }
@@ -225,5 +241,24 @@ impl Cleaner<'_, '_> {
         self.mesh.set_point(v, curve.at(best), DVec3::ZERO);
         self.mesh.set_place(v, Place::Arc { arc, at: best });
         true
+    }
+
+    /// Where the neighbours of a curve's vertex are on it.
+    fn beside_on(&self, v: u32, arc: u32, at: f64) -> SmallVec<[f64; 2]> {
+        let length = self.ground.curves[arc as usize].length();
+        let on_arc = self.mesh.star(v).filter(|&h| self.mesh.arc(h) == arc);
+        on_arc
+            .map(|h| match self.mesh.place(self.mesh.target(h)) {
+                Place::Arc { arc: other, at } if other == arc => at,
+                // The node at the nearer end; of two, the one on the other side.
+                _ => {
+                    let to = self.mesh.point(self.mesh.target(h));
+                    let ends = [0.0, length];
+                    let off =
+                        |end: f64| (self.ground.curves[arc as usize].at(end) - to).length() + 1e-3 * (end - at).abs();
+                    if off(ends[0]) <= off(ends[1]) { 0.0 } else { length }
+                }
+            })
+            .collect()
     }
 }

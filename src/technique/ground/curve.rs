@@ -95,13 +95,19 @@ pub(super) fn network(surface: &Surface, edges: &EdgeTable) -> Network {
     network
 }
 
-/// Whether each vertex is a node of the network.
-pub(super) fn nodes(surface: &Surface, network: &Network, corner: f64) -> Vec<bool> {
+/// Whether each vertex is a node of the network. The pins of released vertices do not count.
+pub(super) fn nodes(
+    surface: &Surface,
+    network: &Network,
+    corner: f64,
+    released: &std::collections::BTreeSet<VertexId>,
+) -> Vec<bool> {
     let cosine = libm::cos(corner.to_radians());
     let is_node = |v: VertexId| {
         let Some(spokes) = network.get(&v) else { return false };
         let [(a, s), (b, t)] = spokes[..] else { return true };
-        if surface.carried.pins.get(&v) == Some(&Freedom::Keep) || s.cause != t.cause {
+        let is_pinned = surface.carried.pins.get(&v) == Some(&Freedom::Keep) && !released.contains(&v);
+        if is_pinned || s.cause != t.cause {
             return true;
         }
         let [p, q, r] = [a, v, b].map(|w| surface.points[w]);

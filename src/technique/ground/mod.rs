@@ -8,12 +8,16 @@
 //! # Cost
 //! O(F log F) to build; O(log F) a projection.
 
+mod choose;
 mod curve;
 mod sample;
+
+use std::collections::BTreeSet;
 
 use glam::DVec3;
 use rustc_hash::FxHashMap;
 
+pub use choose::Choice;
 pub use curve::Curve;
 pub(crate) use sample::respread;
 pub use sample::sample;
@@ -62,14 +66,23 @@ pub struct Ground<'a> {
     sheets: Vec<Sheet>,
     /// The regions on both sides of each curve, [`NONE`] beyond a rim.
     pub beside: Vec<[u32; 2]>,
+    /// Borders that are not followed.
+    pub left_out: usize,
 }
 
 impl<'a> Ground<'a> {
     /// Finds curves and regions of a surface.
     pub fn new(surface: &'a Surface) -> Self {
+        Self::following(surface, None)
+    }
+
+    /// The same without the borders of regions that `choice` speaks against.
+    pub fn following(surface: &'a Surface, choice: Option<&Choice>) -> Self {
         let edges = EdgeTable::new(surface);
-        let network = curve::network(surface, &edges);
-        let is_node = curve::nodes(surface, &network, CORNER);
+        let mut network = curve::network(surface, &edges);
+        let (left_out, released) =
+            choice.map(|choice| choose::leave_out(surface, &edges, &mut network, CORNER, choice)).unwrap_or_default();
+        let is_node = curve::nodes(surface, &network, CORNER, &released);
         let curves = curve::curves(surface, &network, is_node);
         let mut arcs = FxHashMap::default();
         for (arc, curve) in curves.iter().enumerate() {
@@ -78,7 +91,7 @@ impl<'a> Ground<'a> {
             }
         }
         let (regions, count) = flood(surface, &edges, &arcs);
-        let places = places(surface, &curves, &regions);
+        let places = places(surface, &curves, &regions, &released);
         let beside = beside(&edges, &curves, &regions);
         let mut of: Vec<Vec<FaceId>> = vec![Vec::new(); count];
         for f in surface.faces.ids() {
@@ -88,7 +101,7 @@ impl<'a> Ground<'a> {
             tree: TriangleBvh::new(faces.iter().map(|&f| surface.corners(f)).collect()),
             faces,
         };
-        Self { surface, curves, regions, places, arcs, sheets: of.into_iter().map(sheet).collect(), beside }
+        Self { surface, curves, regions, places, arcs, sheets: of.into_iter().map(sheet).collect(), beside, left_out }
     }
 
     /// Number of regions.
@@ -174,7 +187,7 @@ fn beside(edges: &EdgeTable, curves: &[Curve], regions: &[u32]) -> Vec<[u32; 2]>
     curves.iter().map(of).collect()
 }
 
-fn places(surface: &Surface, curves: &[Curve], regions: &[u32]) -> Vec<Place> {
+fn places(surface: &Surface, curves: &[Curve], regions: &[u32], released: &BTreeSet<VertexId>) -> Vec<Place> {
     let mut places = vec![Place::Node; surface.points.len()];
     for (f, corners) in surface.faces.enumerate() {
         for v in corners {
@@ -182,7 +195,7 @@ fn places(surface: &Surface, curves: &[Curve], regions: &[u32]) -> Vec<Place> {
         }
     }
     for (v, freedom) in &surface.carried.pins {
-        if *freedom == Freedom::Keep && v.index() < places.len() {
+        if *freedom == Freedom::Keep && v.index() < places.len() && !released.contains(v) {
             places[v.index()] = Place::Node;
         }
     }

@@ -1,42 +1,51 @@
 //! Vertices of curves: put where the samples are, or spread evenly.
 
 use super::Remesher;
-use crate::technique::ground::{respread, sample};
-use crate::technique::mixed::{NONE, Place};
+use crate::technique::ground::{Ground, respread, sample};
+use crate::technique::mixed::{Mixed, NONE, Place};
 
 /// A vertex nearer to a sample than this part of the spacing is moved there.
 const NEAR: f64 = 0.3;
 
-impl Remesher<'_, '_> {
-    /// The vertices of each curve in order with their places along it, ends included.
-    pub(super) fn chains(&self) -> Vec<Vec<(f64, u32)>> {
-        let mut chains: Vec<Vec<(f64, u32)>> = vec![Vec::new(); self.ground.curves.len()];
-        for h in self.mesh.edges().filter(|&h| self.mesh.arc(h) != NONE) {
-            let arc = self.mesh.arc(h) as usize;
-            let curve = &self.ground.curves[arc];
-            let ends = [curve.points[0], curve.points[curve.points.len() - 1]];
-            for v in [self.mesh.origin(h), self.mesh.target(h)] {
-                match self.mesh.place(v) {
-                    Place::Arc { at, .. } => chains[arc].push((at, v)),
-                    _ if curve.is_closed() => chains[arc].extend([(0.0, v), (curve.length(), v)]),
-                    _ => {
-                        let [start, end] = ends.map(|p| (p - self.mesh.point(v)).length_squared());
-                        chains[arc].push((if start <= end { 0.0 } else { curve.length() }, v));
-                    }
+/// The vertices of each curve in order with their places along it, ends included.
+pub fn chains(mesh: &Mixed, ground: &Ground<'_>) -> Vec<Vec<(f64, u32)>> {
+    let mut chains: Vec<Vec<(f64, u32)>> = vec![Vec::new(); ground.curves.len()];
+    for h in mesh.edges().filter(|&h| mesh.arc(h) != NONE) {
+        let arc = mesh.arc(h) as usize;
+        let curve = &ground.curves[arc];
+        let ends = [curve.points[0], curve.points[curve.points.len() - 1]];
+        for v in [mesh.origin(h), mesh.target(h)] {
+            match mesh.place(v) {
+                Place::Arc { at, .. } => chains[arc].push((at, v)),
+                _ if curve.is_closed() => chains[arc].extend([(0.0, v), (curve.length(), v)]),
+                _ => {
+                    let [start, end] = ends.map(|p| (p - mesh.point(v)).length_squared());
+                    chains[arc].push((if start <= end { 0.0 } else { curve.length() }, v));
                 }
             }
         }
-        for list in &mut chains {
-            list.sort_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
-            list.dedup();
-        }
-        chains
     }
+    for list in &mut chains {
+        list.sort_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
+        list.dedup();
+    }
+    chains
+}
 
+/// The largest distance between a curve and the edges on it.
+pub fn curve_distance(mesh: &Mixed, ground: &Ground<'_>) -> f64 {
+    let sag = |(arc, chain): (usize, Vec<(f64, u32)>)| {
+        let curve = &ground.curves[arc];
+        chain.windows(2).map(|pair| curve.sag(pair[0].0, pair[1].0)).fold(0.0, f64::max)
+    };
+    chains(mesh, ground).into_iter().enumerate().map(sag).fold(0.0, f64::max)
+}
+
+impl Remesher<'_, '_> {
     /// Samples every curve and makes its vertices those of the samples.
     pub(super) fn resample_curves(&mut self) {
         self.surplus = vec![false; self.mesh.vertex_slots() as usize];
-        let mut chains = self.chains();
+        let mut chains = chains(self.mesh, self.ground);
         let mut places: Vec<Vec<f64>> = (0..chains.len()).map(|arc| self.samples(arc, &chains[arc], 1)).collect();
         for arc in self.cramped(&places) {
             places[arc] = self.samples(arc, &chains[arc], 2);
@@ -153,14 +162,20 @@ impl Remesher<'_, '_> {
 
     /// Spreads the vertices of each curve evenly by the sizes there.
     pub(super) fn even_curves(&mut self) {
-        for (arc, chain) in self.chains().into_iter().enumerate() {
+        for (arc, chain) in chains(self.mesh, self.ground).into_iter().enumerate() {
             if chain.len() < 3 {
                 continue;
             }
             let curve = &self.ground.curves[arc];
             let sizes: Vec<(f64, f64)> = chain.iter().map(|&(at, v)| (at, self.mesh.size(v))).collect();
             let places = respread(&sizes, curve.length(), chain.len() - 1);
-            if places.len() != chain.len() {
+            let sag = |at: &mut dyn Iterator<Item = f64>| {
+                let at: Vec<f64> = at.collect();
+                at.windows(2).map(|pair| curve.sag(pair[0], pair[1])).fold(0.0, f64::max)
+            };
+            let after = sag(&mut places.iter().copied());
+            let spoils = after > self.rules.curve_tolerance && after > sag(&mut chain.iter().map(|&(at, _)| at));
+            if places.len() != chain.len() || spoils {
                 continue;
             }
             for k in 1..chain.len() - 1 {

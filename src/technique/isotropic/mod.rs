@@ -22,6 +22,7 @@ mod parity;
 
 use glam::DVec3;
 
+pub use curves::{chains, curve_distance};
 pub use parity::{odd_regions, pair_up};
 
 use super::ground::Ground;
@@ -37,8 +38,10 @@ pub struct Rules {
     pub tolerance: f64,
     /// Largest distance of chords from the curves.
     pub curve_tolerance: f64,
-    /// Sizes are not lowered below this.
+    /// Sizes are not lowered below this beforehand.
     pub least_size: f64,
+    /// Nor below this where the distance proves too large afterwards.
+    pub floor: f64,
     /// How much the size may grow over a unit of length.
     pub gradation: f64,
 }
@@ -77,7 +80,7 @@ pub fn tighten(
     for &(at, reach, size) in places {
         for i in tree.in_box(&Aabb::of([at]).grown(reach)) {
             let v = all[i as usize];
-            mesh.set_size(v, mesh.size(v).min(size.max(rules.least_size)));
+            mesh.set_size(v, mesh.size(v).min(size.max(rules.floor)));
         }
     }
     Remesher { surplus: Vec::new(), mesh, ground, rules }.adapt(1, watch)
