@@ -4,16 +4,19 @@
 //! tangential relaxation, projection), each edit admitted by the [`Editor`] only: thresholds, certified tolerance and
 //! embedding hold after every one of them, and it must gain, so that the passes end.
 //!
-//! [`raise_stretch`] repairs the faces below a threshold before and after.
+//! Where no face is poor any more, the mean is raised: see [`coarsen`]. [`raise_stretch`] repairs the faces below a threshold before and after.
 
 mod cavity;
 mod edit;
 mod ops;
 mod raise;
+mod regular;
 mod search;
 
 pub use ops::Gain;
+use raise::settle_in;
 pub use raise::{faces_below, raise_stretch, touch_up};
+use regular::flip_to_regular;
 
 use glam::DVec3;
 
@@ -38,6 +41,9 @@ const BETTER: f64 = 0.45;
 
 /// Rounds of flips and relaxation between collapses, and at the end.
 const ROUNDS: [usize; 2] = [2, 8];
+
+/// Rounds of flips towards regular valences and of moves that raise the mean, at the end.
+const EVENING: usize = 4;
 
 /// Coarsens to `target` faces, or until no edge is valid, with optimisation in between.
 ///
@@ -69,11 +75,31 @@ pub fn coarsen(
         optimise(editor, 1, watch)?;
     }
     optimise(editor, ROUNDS[1], watch)?;
+    even_out(editor, GOOD.max(rules.min_stretch), watch)?;
     for threshold in [rules.min_stretch, GOOD.max(rules.min_stretch)] {
         raise_stretch(editor, threshold, rules, watch)?;
     }
     touch_up(editor, BETTER.max(rules.min_stretch), rules, watch)?;
     Ok(ending)
+}
+
+/// Raises the mean stretch where no face falls below `least` by it: flips towards regular valences, which only pay after
+/// the moves that follow, and moves to the centre of the star and then to the best place nearby.
+fn even_out(editor: &mut Editor<'_>, least: f64, watch: &Watch) -> Result<(), Cancelled> {
+    watch.phase("even out", Some(EVENING as u64));
+    let gain = Gain::Mean(least);
+    for round in 0..EVENING {
+        watch.advance(round as u64, || format!("{} faces", editor.mesh().face_count()));
+        if round + 1 < EVENING {
+            flip_to_regular(editor, watch)?;
+        }
+        for _ in 0..2 {
+            relax_vertices(editor, watch, |editor, v| relax(editor, v, gain))?;
+        }
+        flip_edges(editor, watch)?;
+        relax_vertices(editor, watch, |editor, v| settle_in(editor, v, gain))?;
+    }
+    Ok(())
 }
 
 /// Collapses until no edge is valid, those that leave good faces first, and nothing else in between.
@@ -92,7 +118,7 @@ pub fn optimise(editor: &mut Editor<'_>, rounds: usize, watch: &Watch) -> Result
     for round in 0..rounds {
         watch.advance(round as u64, || format!("{} faces", editor.mesh().face_count()));
         split_long_edges(editor, watch)?;
-        last = flip_edges(editor, watch)? + relax_vertices(editor, watch)?;
+        last = flip_edges(editor, watch)? + relax_vertices(editor, watch, relax_for_quality)?;
         if last * 200 < editor.mesh().vertex_count() {
             break;
         }
@@ -138,17 +164,25 @@ fn flip_edges(editor: &mut Editor<'_>, watch: &Watch) -> Result<usize, Cancelled
     Ok(flips)
 }
 
-fn relax_vertices(editor: &mut Editor<'_>, watch: &Watch) -> Result<usize, Cancelled> {
+fn relax_vertices(
+    editor: &mut Editor<'_>,
+    watch: &Watch,
+    relax: impl Fn(&mut Editor<'_>, VertexId) -> bool,
+) -> Result<usize, Cancelled> {
     let mut moves = 0;
     for v in (0..editor.mesh().vertex_slots()).map(VertexId::new) {
         if v.index().is_multiple_of(256) {
             watch.check()?;
         }
-        if editor.mesh().vertex_is_live(v) && relax(editor, v, Gain::Quality) {
+        if editor.mesh().vertex_is_live(v) && relax(editor, v) {
             moves += 1;
         }
     }
     Ok(moves)
+}
+
+fn relax_for_quality(editor: &mut Editor<'_>, v: VertexId) -> bool {
+    relax(editor, v, Gain::Quality)
 }
 
 /// Relaxation of a vertex: a free one tangentially, one on a curve along it.

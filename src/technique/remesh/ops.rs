@@ -25,6 +25,10 @@ pub enum Gain {
     LeastStretch,
     /// The product of least and mean stretch rises, and the least does not fall below the threshold.
     Quality,
+    /// The mean stretch rises, and no face falls below this stretch that was not.
+    Mean(f64),
+    /// Nothing asked, except that no face falls below this stretch that was not.
+    Keep(f64),
     /// Nothing asked, except that no face falls below the threshold.
     None,
 }
@@ -71,7 +75,7 @@ impl Editor<'_> {
         let tallest = ends.map(valence).into_iter().max().unwrap_or(0);
         let is_worth_it = match gain {
             Gain::Mend(_) | Gain::LeastStretch => true,
-            Gain::Quality | Gain::None => false,
+            Gain::Quality | Gain::Mean(_) | Gain::Keep(_) | Gain::None => false,
         };
         is_worth_it && apexes.iter().all(|&v| valence(v) < most.max(tallest))
             || apexes.iter().all(|&v| valence(v) < most)
@@ -203,7 +207,7 @@ impl Editor<'_> {
     fn tally(&self, faces: &[FaceId], gain: Gain) -> Tally {
         let mut tally = match gain {
             Gain::Mend(threshold) => Tally::short_of(threshold),
-            Gain::LeastStretch | Gain::Quality | Gain::None => Tally::new(),
+            Gain::LeastStretch | Gain::Quality | Gain::Mean(_) | Gain::Keep(_) | Gain::None => Tally::new(),
         };
         for &f in faces {
             tally.add(self.stretch(f), self.size(f));
@@ -229,6 +233,11 @@ impl Editor<'_> {
             }
             Gain::LeastStretch => after.stretch_min > before.stretch_min * (1.0 + 1e-3),
             Gain::Quality => after.stretch_min >= floor && after.quality() > before.quality() * (1.0 + 2e-3),
+            Gain::Mean(least) => {
+                after.stretch_min >= least_stretch(least, before.stretch_min).max(floor)
+                    && after.mean() > before.mean() * (1.0 + 1e-3)
+            }
+            Gain::Keep(least) => after.stretch_min >= least_stretch(least, before.stretch_min).max(floor),
             Gain::None => after.stretch_min >= floor,
         }
     }

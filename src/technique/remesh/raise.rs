@@ -15,6 +15,7 @@ use super::{Gain, relax};
 use crate::mesh::geometry::{angle, area_vector, stretch};
 use crate::mesh::halfedge::{HalfedgeMesh, edge_of};
 use crate::mesh::{EdgeId, FaceId, Freedom, VertexId};
+use crate::technique::collapse::priority::Tally;
 use crate::technique::collapse::session::best_stretch_at;
 use crate::technique::collapse::{CollapseRules, Editor};
 use crate::watch::{Cancelled, Watch};
@@ -182,19 +183,34 @@ const MOST_TRIED: usize = 3;
 /// Moves a vertex a little to where its star falls least short of the threshold: a search, where relaxation to the
 /// centre of the star does not help.
 fn nudge(editor: &mut Editor<'_>, v: VertexId, threshold: f64) -> bool {
+    let lack = |editor: &Editor<'_>, to: DVec3| shortfall(editor, v, to, threshold);
+    move_to_best(editor, v, Gain::Mend(threshold), lack)
+}
+
+/// Moves a vertex to the place nearby where its star has the best mean stretch that gains.
+pub(super) fn settle_in(editor: &mut Editor<'_>, v: VertexId, gain: Gain) -> bool {
+    let poorness = |editor: &Editor<'_>, to: DVec3| {
+        let mut tally = Tally::new();
+        let mesh = editor.mesh();
+        for f in mesh.faces_around(v) {
+            tally.add_stretch(stretch(mesh.corners(f).map(|w| if w == v { to } else { mesh.point(w) })));
+        }
+        -tally.mean()
+    };
+    move_to_best(editor, v, gain, poorness)
+}
+
+/// Tries the places round a vertex that are rated lower than its own, lowest first.
+fn move_to_best(editor: &mut Editor<'_>, v: VertexId, gain: Gain, rate: impl Fn(&Editor<'_>, DVec3) -> f64) -> bool {
     let wishes = match editor.mesh().vertex_freedom(v) {
         Freedom::Free => around(editor, v),
         Freedom::OnCurve => along_curve(editor, v),
         Freedom::Keep => return false,
     };
-    let mut rated: Vec<(f64, DVec3)> = wishes.into_iter().map(|to| (shortfall(editor, v, to, threshold), to)).collect();
+    let mut rated: Vec<(f64, DVec3)> = wishes.into_iter().map(|to| (rate(editor, to), to)).collect();
     rated.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let now = shortfall(editor, v, editor.mesh().point(v), threshold);
-    rated
-        .into_iter()
-        .take_while(|(rest, _)| *rest < now)
-        .take(MOST_TRIED)
-        .any(|(_, to)| editor.try_move(v, to, Gain::Mend(threshold)))
+    let now = rate(editor, editor.mesh().point(v));
+    rated.into_iter().take_while(|(rest, _)| *rest < now).take(MOST_TRIED).any(|(_, to)| editor.try_move(v, to, gain))
 }
 
 /// What the star of a vertex would lack to the threshold, were the vertex elsewhere.
