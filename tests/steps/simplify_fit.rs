@@ -2,10 +2,13 @@
 
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 use glam::DVec3;
+use meshmill::format::{Format, read};
 use meshmill::mesh::{Id, Support, Surface};
 use meshmill::metric;
+use meshmill::step::Artifact;
 use meshmill::watch::Watch;
 
 use super::golden::{golden, golden_of};
@@ -123,6 +126,41 @@ fn what_is_promised_holds_when_counted_again() {
         assert_eq!(number("euler-characteristic"), if name == "torus" { 0.0 } else { 2.0 });
         assert!(number("distance") - number("distance-slack") <= made.stats["tolerance"].as_f64().unwrap(), "{name}");
         assert_eq!(made.stats["faces-after"].as_u64().unwrap() as usize, result.faces.len());
+    }
+}
+
+#[test]
+fn topology_is_kept_on_many_meshes() {
+    let shipped = |file: &str| {
+        let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/meshes").join(file);
+        let bytes = std::fs::read(path).unwrap();
+        let soup = read(Format::detect(file, &bytes).unwrap(), &bytes, &Watch::silent()).unwrap().0;
+        run("repair", "", &Artifact::Soup(Arc::new(soup))).artifact
+    };
+    let meshes = [
+        ("box", surface(rounded_box(HALF, RADIUS, 2, 3))),
+        ("cube", surface(shapes::surface(&shapes::subdivided(&shapes::cube(), 3)))),
+        ("sphere", surface(shapes::surface(&shapes::sphere(3)))),
+        ("torus", surface(shapes::surface(&shapes::torus(30, 12)))),
+        ("bracket", shipped("l_bracket.stl")),
+        ("part", shipped("simple_part.stl")),
+        ("open plate with holes", shipped("plate_holes_open.stl")),
+        ("tee", shipped("t_joint.obj")),
+    ];
+    for (name, mesh) in meshes {
+        // Far beyond what the meshes have to give: topology is lost where collapses run out.
+        for parameters in ["remove = \"99%\", tolerance = \"2%\"", "remove = \"60%\", tolerance-mode = \"plane\""] {
+            let from = run("features", "", &mesh).artifact;
+            let made = run("simplify-fit", parameters, &from);
+            let measured = [&from, &made.artifact].map(|artifact| {
+                let soup = artifact.to_soup().unwrap();
+                metric::measure(&soup, None, &Watch::silent()).unwrap()
+            });
+            for of in ["components", "euler-characteristic", "boundary-loops", "closed", "manifold", "oriented"] {
+                let [before, after] = [0, 1].map(|i| measured[i].get(of).map(|m| format!("{m:?}")));
+                assert!(before.is_some() && before == after, "{name}, {parameters}: {of} {before:?} to {after:?}");
+            }
+        }
     }
 }
 

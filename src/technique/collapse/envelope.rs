@@ -35,6 +35,9 @@ const FINEST: f64 = 1.0 / 16.0;
 /// Parts that one check may look at before it gives up and refuses the edit.
 const CHECK_BUDGET: usize = 3000;
 
+/// And that the last check of a face may look at, which is made once.
+const CERTIFY_BUDGET: usize = 1_000_000;
+
 type Triangle = [DVec3; 3];
 
 /// The tolerance zone of a reference, and who covers which piece of it.
@@ -111,10 +114,13 @@ impl<'a> Envelope<'a> {
     /// Whether the whole surface and the whole reference lie within `tolerance` of each other, certified anew for the
     /// surface's side; the reference's side is what the pieces stand for.
     pub fn certifies(&mut self, mesh: &HalfedgeMesh, tolerance: f64) -> bool {
-        let kept = std::mem::replace(&mut self.reach, tolerance);
+        // Edits keep a little less than the tolerance. Parts smaller than the rest pass wherever the surface does; how
+        // finely an edit was tested says nothing here, as its faces are cut in another order.
+        let kept = (self.reach, self.finest);
+        (self.reach, self.finest) = (tolerance, 0.5 * (1.0 - MARGIN) * tolerance);
         let faces: Vec<FaceId> = mesh.faces().collect();
-        let within = faces.into_iter().all(|f| self.is_within(&mesh.corner_points(f)));
-        self.reach = kept;
+        let within = faces.into_iter().all(|f| self.is_within(&mesh.corner_points(f), CERTIFY_BUDGET));
+        (self.reach, self.finest) = kept;
         within && self.uncovered == 0
     }
 
@@ -190,7 +196,7 @@ impl<'a> Envelope<'a> {
     /// new owners wait for [`Envelope::commit`].
     pub fn admits(&mut self, old: &[FaceId], new: &[Triangle], beside: &[Triangle]) -> bool {
         new.iter().all(|face| self.may_be_within(face))
-            && new.iter().all(|face| self.is_within(face))
+            && new.iter().all(|face| self.is_within(face, CHECK_BUDGET))
             && self.is_covered(old, new, beside)
     }
 
@@ -208,16 +214,15 @@ impl<'a> Envelope<'a> {
     /// A part that no single triangle covers is cut along the sides of the one nearest to its middle: what lies over
     /// that one is judged by its corners, the rest goes on. Neighbouring parts mostly lie near the same triangle, so the
     /// last one found is asked first, and the tree is searched only until something is near enough.
-    fn is_within(&mut self, face: &Triangle) -> bool {
+    fn is_within(&mut self, face: &Triangle, mut budget: usize) -> bool {
         let mut parts = std::mem::take(&mut self.parts);
         parts.clear();
         parts.push(Convex::from_slice(face));
         let mut known = self.reference_target(self.hint);
-        let mut budget = CHECK_BUDGET;
         let mut within = true;
         while let (true, Some(part)) = (within, parts.pop()) {
             within = budget > 0 && self.settle_part(&part, &mut known, &mut parts);
-            budget -= 1;
+            budget = budget.saturating_sub(1);
         }
         self.parts = parts;
         within

@@ -16,7 +16,11 @@ fn noise(seed: u32) -> impl FnMut() -> f64 {
 
 /// Points in `rows` rows over an arc of a cylinder, off its surface by `off` of the radius, with noisy normals.
 fn arc(radius: f64, degrees: f64, rows: usize, off: f64, tilt: f64) -> (Vec<DVec3>, Vec<DVec3>) {
-    let mut random = noise(7);
+    sampled_arc(radius, degrees, rows, off, tilt, 7)
+}
+
+fn sampled_arc(radius: f64, degrees: f64, rows: usize, off: f64, tilt: f64, seed: u32) -> (Vec<DVec3>, Vec<DVec3>) {
+    let mut random = noise(seed);
     let (mut points, mut normals) = (Vec::new(), Vec::new());
     let place = dvec3(3.0, -2.0, 5.0);
     let axis = dvec3(1.0, 2.0, 2.0) / 3.0;
@@ -66,15 +70,20 @@ fn an_exact_cylinder_is_found_in_any_arc() {
 }
 
 /// Noise of a thousandth of the radius and normals off by 0.6 degrees cost 0.14 %, 0.55 % and 2.9 % of the radius at
-/// 90, 45 and 20 degrees on average: here the bound is three times that, for one sample.
+/// 90, 45 and 20 degrees: the mean of many samples, and none beyond what the fit itself says of its uncertainty.
 #[test]
 fn noise_costs_a_cylinder_no_more_than_its_arc_explains() {
     for (degrees, share) in [(90.0, 0.0014), (45.0, 0.0055), (20.0, 0.029)] {
-        let (points, normals) = arc(3.0, degrees, 2, 1e-3, 0.01);
-        let (cylinder, quality) = fit_cylinder(&points, &normals).unwrap();
-        let error = (cylinder.radius - 3.0).abs();
-        assert!(error < 3.0 * share * 3.0, "{degrees} degrees: {error}");
-        assert!(error < 4.0 * quality.radius_deviation, "{degrees} degrees: {error}, {quality:?}");
+        let mut sum = 0.0;
+        for seed in 1..=100 {
+            let (points, normals) = sampled_arc(3.0, degrees, 2, 1e-3, 0.01, seed);
+            let (cylinder, quality) = fit_cylinder(&points, &normals).unwrap();
+            let error = (cylinder.radius - 3.0).abs();
+            assert!(error < 6.0 * quality.radius_deviation, "{degrees} degrees: {error}, {quality:?}");
+            sum += error;
+        }
+        let mean = sum / 100.0;
+        assert!(mean / 3.0 < share, "{degrees} degrees: {mean}");
     }
 }
 
