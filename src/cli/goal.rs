@@ -4,15 +4,17 @@ use std::fmt::Write;
 use std::path::Path;
 use std::sync::Arc;
 
-use super::Global;
 use super::context::{plan_cases, relative};
 use super::exit::{Exit, Fault, data, say};
+use super::run::write_record;
 use super::signals::Interrupt;
 use super::sweep::{Arguments, table_text, write_tables};
+use super::{Global, report};
 use crate::plan::CaseSpec;
 use crate::plan::goal::search::{Merit, search};
 use crate::plan::goal::{Goal, parse};
 use crate::recipe::{Diagnostics, Recipe, Span, Tree, Value, node_of, suggest};
+use crate::report::Report;
 use crate::report::measure::value_text;
 use crate::report::sweep::{RowState, SweepRow, SweepTable};
 use crate::run::{self, Observer, Plan, RunOptions, RunOutcome};
@@ -72,6 +74,8 @@ struct Hunt<'a> {
     options: &'a RunOptions,
     observer: Arc<dyn Observer>,
     table: SweepTable,
+    /// The cases of the table.
+    specs: Vec<CaseSpec>,
     merits: Vec<Merit>,
     fault: Option<Fault>,
 }
@@ -97,6 +101,7 @@ pub(super) fn run(
         store,
         options,
         observer,
+        specs: Vec::new(),
         merits: Vec::new(),
         fault: None,
     };
@@ -173,6 +178,7 @@ impl Hunt<'_> {
         self.table.parameters = table.parameters;
         self.table.columns = table.columns;
         self.table.rows.push(row);
+        self.specs.push(spec);
         Some(merit)
     }
 
@@ -232,6 +238,9 @@ impl Hunt<'_> {
             return Ok(interrupt.exit());
         }
         let Some(best) = best else { return Ok(Exit::Fault) };
+        if arguments.report {
+            self.report()?;
+        }
         let row = &self.table.rows[best];
         if self.merits[best].violation > 0.0 {
             say(&format!("none of {} evaluations reaches the goal; the nearest is {}", self.merits.len(), row.case));
@@ -256,6 +265,17 @@ impl Hunt<'_> {
             data(&file.display().to_string());
         }
         Ok(Exit::Done)
+    }
+
+    /// Writes the record and the report of all evaluations, which are in the cache.
+    fn report(&self) -> Result<(), Fault> {
+        let plan = plan_cases(self.recipe, &self.specs, Some(&self.goal.columns))?;
+        let silent: Arc<dyn Observer> = Arc::new(run::Silent);
+        let outcome = run::run(&plan, self.store, self.options, &silent)?;
+        let mut report = Report::new(&self.recipe.name, &plan, &outcome);
+        report::describe(&mut report, self.recipe);
+        write_record(&report, &self.options.out)?;
+        report::write(&report, Some(&self.table), self.store, &[], &self.options.out.join("report.html"))
     }
 
     /// A recipe that extends the one searched, with every parameter filled in.

@@ -8,6 +8,7 @@ use clap::ValueEnum;
 use super::Global;
 use super::context::{Planned, RecipeArguments, open_store};
 use super::exit::{Exit, Fault, say};
+use super::picture::Pictures;
 use super::run::{execute, options, tell};
 use super::signals::Interrupt;
 use crate::report::lock::{Class, Lock, ingredients};
@@ -55,7 +56,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Fault>
     let interrupt = Interrupt::listen();
     let options = options(&planned, arguments.out.as_deref(), arguments.jobs, &interrupt)?;
     let before = ingredients(&planned.recipe.name, &planned.plan, &run::records(&planned.plan, &store, &options));
-    let (report, cancelled) = execute(&planned, &store, &options, global, None)?;
+    let (report, cancelled) = execute(&planned, &store, &options, global, (None, Pictures::default()))?;
     if report.status != Status::Done {
         tell(&report, false, global.quiet)?;
         say("nothing was locked");

@@ -6,21 +6,47 @@ use std::path::{Path, PathBuf};
 
 use super::exit::Fault;
 use crate::report::picture;
-use crate::run::{self, FileState, Plan, RunOutcome, TaskId, VERSION};
+use crate::run::{self, FileState, Output, Plan, RunOutcome, TaskId, VERSION};
 use crate::store::Store;
+
+/// With more outputs than this, pictures would cost more than trivial steps, and nobody looks at them one by one.
+const FEW: usize = 32;
+
+/// Which outputs get a picture.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+pub(super) enum Pictures {
+    /// All of up to 32 pictures; none of more.
+    #[default]
+    Few,
+    /// All.
+    All,
+    /// None.
+    None,
+}
 
 /// Width and height in pixels.
 const SIZE: [u32; 2] = [640, 480];
 
 /// Draws what is new, and removes pictures of files that are no longer there. A picture that is at least as new as its
 /// file, which was right already, stays; so a second run draws nothing.
-pub(super) fn write(plan: &Plan, outcome: &RunOutcome, store: &Store) -> Result<(), Fault> {
-    for (place, wanted) in wanted(plan, outcome) {
+pub(super) fn write(plan: &Plan, outcome: &RunOutcome, store: &Store, which: Pictures) -> Result<(), Fault> {
+    let all = wanted(plan, outcome);
+    let is_drawn = match which {
+        Pictures::Few => all.len() <= FEW,
+        Pictures::All => true,
+        Pictures::None => false,
+    };
+    for (place, wanted) in all {
         if wanted.stale.is_file() && fs::remove_file(&wanted.stale).is_ok() && !wanted.failed_gate {
             // Only an empty folder can be removed, so this takes nothing that shows a failure.
             let _ = wanted.stale.parent().map(fs::remove_dir);
         }
         if wanted.is_current && is_as_new(&place, &wanted.file) {
+            continue;
+        }
+        if !is_drawn {
+            // It would show an earlier mesh.
+            let _ = fs::remove_file(&place);
             continue;
         }
         let artifact = outcome.task(wanted.task).content.and_then(|content| store.load(&content));
@@ -47,10 +73,14 @@ struct Wanted {
 /// One picture for the files of a step that differ in their ending only.
 fn wanted(plan: &Plan, outcome: &RunOutcome) -> BTreeMap<PathBuf, Wanted> {
     let mut pictures: BTreeMap<PathBuf, Wanted> = BTreeMap::new();
+    let mut outputs: BTreeMap<(usize, TaskId), Vec<&Output>> = BTreeMap::new();
+    for (number, case) in plan.cases().iter().enumerate() {
+        case.outputs.iter().for_each(|output| outputs.entry((number, output.task)).or_default().push(output));
+    }
     for file in &outcome.files {
-        let outputs = &plan.cases()[file.case].outputs;
         // Elements at fault have a file too, but no output of the recipe.
-        let output = outputs.iter().find(|output| output.task == file.task && file.path.ends_with(&output.file));
+        let outputs = outputs.get(&(file.case, file.task)).into_iter().flatten();
+        let output = outputs.copied().find(|output| file.path.ends_with(&output.file));
         let (Some(output), true) = (output, file.state != FileState::Missing) else { continue };
         let mut place = file.path.with_extension("png");
         if pictures.get(&place).is_some_and(|other| other.task != file.task) {

@@ -7,7 +7,7 @@ use super::Global;
 use super::context::{Planned, RecipeArguments, open_store};
 use super::exit::{Exit, Fault, data, say, say_failure};
 use super::lock::Held;
-use super::picture;
+use super::picture::{self, Pictures};
 use super::progress;
 use super::report;
 use super::signals::Interrupt;
@@ -41,6 +41,9 @@ pub(super) struct Arguments {
     /// Print the report as one JSON document.
     #[arg(long)]
     json: bool,
+    /// Which outputs get a picture beside them: all where there are few of them, all, or none.
+    #[arg(long, value_name = "WHICH", value_enum, default_value_t)]
+    pictures: Pictures,
     /// Write a timeline for a trace viewer.
     #[arg(long, value_name = "FILE")]
     trace: Option<PathBuf>,
@@ -70,7 +73,8 @@ pub(super) fn once(arguments: &Arguments, global: &Global, interrupt: &Interrupt
     options.force.clone_from(&arguments.force);
     let held = arguments.locked.as_ref().map(|file| Held::new(Path::new(file), &planned, &store, &options));
     let held = held.transpose()?;
-    let (report, cancelled) = execute(&planned, &store, &options, global, arguments.trace.as_deref())?;
+    let extras = (arguments.trace.as_deref(), arguments.pictures);
+    let (report, cancelled) = execute(&planned, &store, &options, global, extras)?;
     tell(&report, arguments.json, global.quiet)?;
     if cancelled {
         return Ok(interrupt.exit());
@@ -85,8 +89,8 @@ pub(super) fn once(arguments: &Arguments, global: &Global, interrupt: &Interrupt
         let out = if global.quiet { String::new() } else { table::report(&report.unchanged()) };
         let mut files = planned.files();
         files.extend(report.written());
-        files.push(options.out.join("run.ron"));
-        unchanged.remember(&store, files, Said { out, err: Vec::new(), exit: 0 });
+        let said = Said { out, err: Vec::new(), exit: 0 };
+        unchanged.remember(&store, files, said, &report, &options.out)?;
     }
     Ok(report.status.into())
 }
@@ -96,7 +100,7 @@ impl Arguments {
     fn unchanged(&self, global: &Global) -> Option<Unchanged> {
         let plain =
             self.force.is_empty() && !self.json && !self.report && self.trace.is_none() && self.locked.is_none();
-        let more = (&self.out, &self.only);
+        let more = (&self.out, &self.only, self.pictures);
         (plain && global.verbose == 0).then(|| Unchanged::of("run", &self.recipe, &more, global))
     }
 }
@@ -107,13 +111,13 @@ pub(super) fn execute(
     store: &Store,
     options: &RunOptions,
     global: &Global,
-    trace: Option<&Path>,
+    (trace, pictures): (Option<&Path>, Pictures),
 ) -> Result<(Report, bool), Fault> {
     let outcome = traced(trace, global, &|observer| run::run(&planned.plan, store, options, observer))?;
     let mut report = Report::new(&planned.recipe.name, &planned.plan, &outcome);
     report::describe(&mut report, &planned.recipe);
     if !outcome.cancelled {
-        picture::write(&planned.plan, &outcome, store)?;
+        picture::write(&planned.plan, &outcome, store, pictures)?;
         write_record(&report, &options.out)?;
     }
     Ok((report, outcome.cancelled))
@@ -156,9 +160,12 @@ pub(super) fn jobs_of(jobs: Option<usize>) -> Result<usize, Fault> {
 }
 
 pub(super) fn write_record(report: &Report, out: &Path) -> Result<(), Fault> {
-    let text =
-        record::to_ron(report).map_err(|error| Fault::new(Exit::Fault, format!("cannot write run.ron: {error}")))?;
-    Ok(run::write_file(&out.join("run.ron"), text.as_bytes())?)
+    Ok(run::write_file(&out.join("run.ron"), record_text(report)?.as_bytes())?)
+}
+
+/// What stands in `run.ron`.
+pub(super) fn record_text(report: &Report) -> Result<String, Fault> {
+    record::to_ron(report).map_err(|error| Fault::new(Exit::Fault, format!("cannot write run.ron: {error}")))
 }
 
 pub(super) fn tell(report: &Report, json: bool, quiet: bool) -> Result<(), Fault> {

@@ -6,10 +6,11 @@ use std::sync::Arc;
 use super::Global;
 use super::context::{Planned, RecipeArguments, list_files, open_store, pair, plan_cases};
 use super::exit::{Exit, Fault, data, say};
+use super::picture::{self, Pictures};
 use super::run::{jobs_of, traced, write_record};
 use super::signals::Interrupt;
 use super::unchanged::Unchanged;
-use super::{goal, picture, progress, report};
+use super::{goal, progress, report};
 use crate::plan::sweep::sweep;
 use crate::recipe::Recipe;
 use crate::report::Report;
@@ -38,14 +39,17 @@ pub(super) struct Arguments {
     #[arg(long)]
     list: bool,
     /// Write `report.html` too: scatter with the Pareto front, parallel coordinates, a picture and the mesh of each case.
-    #[arg(long, conflicts_with = "goal")]
-    report: bool,
+    #[arg(long)]
+    pub(super) report: bool,
     /// Print the table as one JSON document.
     #[arg(long, conflicts_with = "csv")]
     json: bool,
     /// Print the table as comma-separated values.
     #[arg(long)]
     csv: bool,
+    /// Which outputs get a picture beside them: all where there are few of them, all, or none.
+    #[arg(long, value_name = "WHICH", value_enum, default_value_t)]
+    pictures: Pictures,
     /// Write a timeline for a trace viewer.
     #[arg(long, value_name = "FILE", conflicts_with = "goal")]
     trace: Option<PathBuf>,
@@ -91,7 +95,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Fault>
         say("interrupted; the next sweep goes on from the last finished task");
         return Ok(interrupt.exit());
     }
-    picture::write(&plan, &outcome, &store)?;
+    picture::write(&plan, &outcome, &store, arguments.pictures)?;
     let mut report = Report::new(&recipe.name, &plan, &outcome);
     report::describe(&mut report, &recipe);
     write_record(&report, &options.out)?;
@@ -104,8 +108,8 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Fault>
     if let Some(unchanged) = unchanged.filter(|_| !found.lists_files && table.count(RowState::Failed) == 0) {
         let mut files = Planned { recipe, plan }.files();
         files.extend(report.written());
-        files.extend(["run.ron", "sweep.csv", "sweep.ron"].map(|name| options.out.join(name)));
-        unchanged.remember(&store, files, said);
+        files.extend(["sweep.csv", "sweep.ron"].map(|name| options.out.join(name)));
+        unchanged.remember(&store, files, said, &report, &options.out)?;
     }
     Ok(exit(&table))
 }
@@ -114,7 +118,7 @@ impl Arguments {
     /// The short cut for this sweep; none where more is asked for than that everything is up to date.
     fn unchanged(&self, global: &Global) -> Option<Unchanged> {
         let plain = self.goal.is_none() && !self.report && !self.list && self.trace.is_none() && global.verbose == 0;
-        let more = (&self.axes, &self.out, self.json, self.csv);
+        let more = (&self.axes, &self.out, self.json, self.csv, self.pictures);
         plain.then(|| Unchanged::of("sweep", &self.recipe, &more, global))
     }
 }

@@ -1,10 +1,12 @@
 //! The short cut of a run or sweep in which nothing has changed since the last one.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use super::Global;
 use super::context::RecipeArguments;
-use super::exit::{data, say};
+use super::exit::{Fault, data, say};
+use super::run::record_text;
+use crate::report::Report;
 use crate::store::Store;
 use crate::store::stamp::{Said, identity, program};
 
@@ -33,8 +35,19 @@ impl Unchanged {
         Some(said.exit)
     }
 
-    /// Remembers a run by the files that it read and wrote.
-    pub(super) fn remember(&self, store: &Store, files: Vec<PathBuf>, said: Said) {
-        store.stamp(&self.identity, files, said);
+    /// Remembers a run by the files that it read and wrote, besides its record, which the next run replaces by that of
+    /// a run in which everything was there.
+    pub(super) fn remember(
+        &self,
+        store: &Store,
+        files: Vec<PathBuf>,
+        said: Said,
+        report: &Report,
+        out: &Path,
+    ) -> Result<(), Fault> {
+        let record = out.join("run.ron");
+        let text = record_text(&report.unchanged())?;
+        store.stamp(&self.identity, files, said, Some((record, text)));
+        Ok(())
     }
 }

@@ -3,9 +3,11 @@
 //! Based on: T. Itoh, A. Yamada, T. Furuhata, K. Inoue, K. Shimada. Rough Quadrilateralation of Triangular Meshes via
 //! Belt-like Subregioning for Surface Reconstruction. IBM Research Report RT0354, 2000, section 4.
 
+use std::collections::BTreeMap;
+
 use crate::mesh::geometry::angle;
 use crate::mesh::topology::{EdgeTable, euler_characteristic};
-use crate::mesh::{Facet, Freedom, Soup, VertexId};
+use crate::mesh::{Carried, FaceId, Facet, Freedom, Soup, VertexId};
 
 /// A border that turns by more, in radians, has a corner.
 const CORNER: f64 = std::f64::consts::FRAC_PI_3;
@@ -24,15 +26,39 @@ pub struct Layout {
 }
 
 /// Counts triangles and irregular vertices. A corner is a border vertex that is pinned, or where the elements' angles
-/// differ from a straight angle by more than 60 degrees; it may have any number of elements.
+/// differ from a straight angle by more than 60 degrees; it may have any number of elements. Regions are judged each on
+/// its own: their borders count as borders, as they do where each is cut into elements by itself.
 pub fn layout_counts(mesh: &Soup) -> Layout {
+    let labels = mesh.carried.regions.as_ref().map(|regions| &regions.labels);
+    let mut parts: BTreeMap<u32, Vec<FaceId>> = BTreeMap::new();
+    for face in mesh.faces.ids() {
+        let label = labels.and_then(|labels| labels.get(face)).copied().unwrap_or(0);
+        parts.entry(label).or_default().push(face);
+    }
+    let triangles = mesh.faces.iter().filter(|f| matches!(f, Facet::Tri(_))).count();
+    let mut layout = Layout { triangles, ..Layout::default() };
+    for faces in parts.values() {
+        let own = faces.iter().map(|&f| mesh.faces[f]).collect();
+        let part = Soup { points: mesh.points.clone(), faces: own, carried: Carried::default() };
+        let (irregular, owed) = part_counts(&part, |v| mesh.carried.pins.get(&v) == Some(&Freedom::Keep));
+        layout.irregular.extend(irregular);
+        layout.forced += owed.unsigned_abs() as usize;
+    }
+    layout.irregular.sort_unstable();
+    layout.irregular.dedup();
+    let mut used: Vec<VertexId> = mesh.faces.iter().flat_map(Facet::corners).copied().collect();
+    used.sort_unstable();
+    used.dedup();
+    layout.vertices = used.len();
+    layout
+}
+
+/// The irregular vertices of one region, and by how much they must be irregular in sum.
+fn part_counts(mesh: &Soup, is_pinned: impl Fn(VertexId) -> bool) -> (Vec<VertexId>, i64) {
     let edges = EdgeTable::new(mesh);
     let mut on_border = vec![false; mesh.points.len()];
-    for (_, key, sides) in edges.iter().filter(|(_, _, sides)| sides.len() == 1) {
-        debug_assert_eq!(sides.len(), 1);
-        for v in &key {
-            on_border[v.index()] = true;
-        }
+    for (_, key, _) in edges.iter().filter(|(_, _, sides)| sides.len() == 1) {
+        key.iter().for_each(|v| on_border[v.index()] = true);
     }
     let mut elements = vec![0_usize; mesh.points.len()];
     let mut angles = vec![0.0_f64; mesh.points.len()];
@@ -45,23 +71,19 @@ pub fn layout_counts(mesh: &Soup) -> Layout {
             angles[v.index()] += angle(at(1) - at(0), at(n - 1) - at(0));
         }
     }
-    let mut layout =
-        Layout { triangles: mesh.faces.iter().filter(|f| matches!(f, Facet::Tri(_))).count(), ..Layout::default() };
+    let mut irregular = Vec::new();
     // Inside 4 − n and on borders 2 − n sum to four times the Euler number.
     let mut owed = 4 * euler_characteristic(mesh, &edges);
     for v in mesh.points.ids().filter(|v| elements[v.index()] > 0) {
-        layout.vertices += 1;
         let (count, turn) = (elements[v.index()], std::f64::consts::PI - angles[v.index()]);
-        let is_pinned = mesh.carried.pins.get(&v) == Some(&Freedom::Keep);
-        if on_border[v.index()] && (is_pinned || turn.abs() > CORNER) {
+        if on_border[v.index()] && (is_pinned(v) || turn.abs() > CORNER) {
             let natural = (angles[v.index()] / std::f64::consts::FRAC_PI_2).round().max(1.0) as i64;
             owed -= 2 - natural;
         } else if count != if on_border[v.index()] { 2 } else { 4 } {
-            layout.irregular.push(v);
+            irregular.push(v);
         }
     }
-    layout.forced = owed.unsigned_abs() as usize;
-    layout
+    (irregular, owed)
 }
 
 #[cfg(test)]

@@ -69,6 +69,8 @@ fn plan_case(
         return;
     }
     let steps: Vec<BoundDecl<'_>> = recipe.steps.iter().filter_map(|decl| bind(decl, context)).collect();
+    // Of two steps of one name, which is reported, the first one counts.
+    context.places = steps.iter().enumerate().rev().map(|(place, step)| (step.decl.name.as_str(), place)).collect();
     let wiring = wire(&steps, context);
     let gates = gates(&steps, &wiring, context);
     let outputs = outputs(&steps, &wiring, context);
@@ -115,8 +117,9 @@ impl<'a, 'r> Nodes<'a, 'r> {
             .chain(written)
             .map(|producer| (producer.step, producer.output.name))
             .collect();
+        let users: BTreeSet<usize> = used.iter().map(|(user, _)| *user).collect();
         for (index, step) in steps.iter().enumerate() {
-            if !used.iter().any(|(user, _)| *user == index)
+            if !users.contains(&index)
                 && let Some(main) = step.def.outputs.first()
             {
                 used.insert((index, main.name));

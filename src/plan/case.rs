@@ -34,6 +34,8 @@ pub(super) struct CaseContext<'r> {
     pub(super) endings: &'r [&'r str],
     pub(super) scope: Scope,
     pub(super) problems: Vec<Diagnostic>,
+    /// Where the steps of a name stand among those that could be read.
+    pub(super) places: BTreeMap<&'r str, usize>,
     check: &'r dyn Fn(&Path) -> Result<(), String>,
     checked: BTreeMap<PathBuf, Result<(), String>>,
     schemas: BTreeMap<&'static str, ParameterSchema>,
@@ -47,6 +49,7 @@ impl<'r> CaseContext<'r> {
             endings: context.endings,
             scope: Scope::default(),
             problems: Vec::new(),
+            places: BTreeMap::new(),
             check: context.check_file,
             checked: BTreeMap::new(),
             schemas: BTreeMap::new(),

@@ -159,7 +159,7 @@ impl Columns<'_, '_> {
     }
 
     fn mesh(&self, name: &str, span: Span, context: &mut CaseContext<'_>) -> Option<Producer> {
-        let found = producer(name, span, self.steps, context.recipe, &mut context.problems)?;
+        let found = producer(name, span, self.steps, context)?;
         match self.wiring.port(found) {
             Some(port) if !is_mesh(port) => {
                 let message = format!("`{name}` gives {port}, and metrics are measured on meshes");

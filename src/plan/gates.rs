@@ -31,7 +31,7 @@ pub(super) fn gates(steps: &[BoundDecl<'_>], wiring: &Wiring, context: &mut Case
     let recipe = context.recipe;
     let mut gates = Vec::new();
     for (name, entry) in recipe.gates.in_order() {
-        let target = producer(name, entry.key, steps, recipe, &mut context.problems);
+        let target = producer(name, entry.key, steps, context);
         let Node::Table(table) = &entry.value.value else {
             let message = format!("a gate is a table of metrics, got {}", entry.value.value.kind());
             let help = format!("write [gates.{name}] and below it min-stretch = {{ at-least = 0.2 }}");
@@ -92,8 +92,30 @@ fn check(
     wiring: &Wiring,
     context: &mut CaseContext<'_>,
 ) -> Option<(Check, Option<Producer>)> {
-    let mut check = Check { metric: metric.name.to_owned(), ..Check::default() };
     let before = context.problems.len();
+    let (mut check, reference) = limits(metric, value, steps, wiring, context);
+    let bounded = check.at_least.is_some() || check.at_most.is_some() || check.equals.is_some();
+    if !bounded && metric.unit == Unit::Flag && !check.same_as_reference {
+        // Naming what a property is compared with says that it must hold.
+        check.equals = Some(Limit::Flag(true));
+    }
+    if context.problems.len() == before {
+        context.problems.extend(incomplete(metric, entry, &check, reference.is_some()));
+    }
+    // The name of the step is the recipe's affair; the task has an input of this name.
+    check.reference = reference.map(|_| "reference".to_owned());
+    (context.problems.len() == before).then_some((check, reference))
+}
+
+/// The limits that a check names, and what it compares with.
+fn limits(
+    metric: &'static MetricDef,
+    value: &Tree,
+    steps: &[BoundDecl<'_>],
+    wiring: &Wiring,
+    context: &mut CaseContext<'_>,
+) -> (Check, Option<Producer>) {
+    let mut check = Check { metric: metric.name.to_owned(), ..Check::default() };
     let mut reference = None;
     if let Node::Table(table) = &value.value {
         for (key, entry) in table.in_order() {
@@ -121,17 +143,7 @@ fn check(
     } else {
         check.equals = limit(metric, "equals", value, context);
     }
-    let bounded = check.at_least.is_some() || check.at_most.is_some() || check.equals.is_some();
-    if !bounded && metric.unit == Unit::Flag && !check.same_as_reference {
-        // Naming what a property is compared with says that it must hold.
-        check.equals = Some(Limit::Flag(true));
-    }
-    if context.problems.len() == before {
-        context.problems.extend(incomplete(metric, entry, &check, reference.is_some()));
-    }
-    // The name of the step is the recipe's affair; the task has an input of this name.
-    check.reference = reference.map(|_| "reference".to_owned());
-    (context.problems.len() == before).then_some((check, reference))
+    (check, reference)
 }
 
 /// What a check lacks.
@@ -221,7 +233,7 @@ fn compared(value: &Tree, steps: &[BoundDecl<'_>], wiring: &Wiring, context: &mu
         context.problems.push(Diagnostic::error(value.span, message));
         return None;
     };
-    let found = producer(name, value.span, steps, context.recipe, &mut context.problems)?;
+    let found = producer(name, value.span, steps, context)?;
     if let Some(port) = wiring.port(found)
         && !is_mesh(port)
     {

@@ -43,7 +43,7 @@ pub(super) fn outputs<'r>(steps: &[BoundDecl<'r>], wiring: &Wiring, context: &mu
     let mut outputs = Vec::new();
     let recipe = reader.context.recipe;
     for (name, entry) in recipe.outputs.in_order() {
-        let producer = producer(name, entry.key, reader.steps, recipe, &mut reader.context.problems);
+        let producer = producer(name, entry.key, reader.steps, reader.context);
         let port = producer.and_then(|producer| reader.wiring.port(producer));
         let items = match &entry.value.value {
             Node::List(items) => items.as_slice(),
@@ -72,7 +72,7 @@ impl Reader<'_, '_> {
     }
 
     fn mesh_step(&mut self, name: &str, span: Span) -> Option<Producer> {
-        let found = producer(name, span, self.steps, self.context.recipe, &mut self.context.problems)?;
+        let found = producer(name, span, self.steps, self.context)?;
         if let Some(port) = self.wiring.port(found)
             && !is_mesh(port)
         {

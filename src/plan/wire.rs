@@ -31,13 +31,12 @@ pub(super) fn producer(
     target: &str,
     span: Span,
     steps: &[BoundDecl<'_>],
-    recipe: &Recipe,
-    problems: &mut Vec<Diagnostic>,
+    context: &mut CaseContext<'_>,
 ) -> Option<Producer> {
     let (name, output) = target.split_once('.').unwrap_or((target, "main"));
-    let Some(step) = steps.iter().position(|step| step.decl.name == name) else {
-        if recipe.step(name).is_none() {
-            problems.push(unknown_step(target, name, span, recipe));
+    let Some(step) = context.places.get(name).copied() else {
+        if context.recipe.step(name).is_none() {
+            context.problems.push(unknown_step(target, name, span, context.recipe));
         }
         return None;
     };
@@ -45,7 +44,7 @@ pub(super) fn producer(
     let Some(output) = def.output(output) else {
         let help = did_you_mean(output, "outputs", def.outputs.iter().map(|output| output.name));
         let message = format!("the step `{name}` ({}) has no output `{output}`", def.name);
-        problems.push(Diagnostic::error(span, message).help_opt(help));
+        context.problems.push(Diagnostic::error(span, message).help_opt(help));
         return None;
     };
     Some(Producer { step, output })
@@ -67,7 +66,7 @@ pub(super) fn wire(steps: &[BoundDecl<'_>], context: &mut CaseContext<'_>) -> Wi
     for step in steps {
         let mut found = Vec::new();
         for link in &step.links {
-            if let Some(from) = producer(&link.target, link.span, steps, context.recipe, &mut context.problems) {
+            if let Some(from) = producer(&link.target, link.span, steps, context) {
                 found.push((link.clone(), from));
             }
         }

@@ -3,7 +3,8 @@
 //! # Algorithm
 //! Curves over the common paths of elements come first, by least squares with both ends fixed; then the patches inside,
 //! by least squares over the covered vertices with a thin-plate term and corrected parameters. Patches beyond the
-//! tolerance get twice the spans. The work is done by `technique::patches`.
+//! tolerance get twice the spans. With `g1` both patches of a smooth seam are drawn into common tangent planes. The work
+//! is done by `technique::patches`.
 //!
 //! Based on: T. Itoh, A. Yamada, T. Furuhata, K. Inoue, K. Shimada. Rough Quadrilateralation of Triangular Meshes via
 //! Belt-like Subregioning for Surface Reconstruction. IBM Research Report RT0354, 2000, section 4, which fits patches by
@@ -17,8 +18,7 @@
 //! Per patch and round linear in its vertices, and cubic in its control points, of which there are few.
 //!
 //! # Departures
-//! Triangles get a patch of which one side is a point. Patches are written as JSON with knots and control points, since
-//! the libraries at hand that write STEP bring a whole geometry kernel.
+//! Triangles get a patch of which one side is a point. Patches are written as JSON with knots and control points.
 
 use std::sync::Arc;
 
@@ -52,11 +52,17 @@ pub struct FitPatchesParams {
     /// Elements of the tessellation along each side of a patch. Default 4.
     #[schemars(range(min = 1, max = 256))]
     pub density: usize,
+    /// Whether patches get common tangent planes along smooth seams, to within 2 degrees. Smooth are seams without a
+    /// marked edge where the surface bends by less than 20 degrees. Default false.
+    pub g1: bool,
 }
+
+/// Tangent planes of a smooth seam that differ by more than this are counted, and with `g1` refined; degrees.
+const SMOOTH: f64 = 2.0;
 
 impl Default for FitPatchesParams {
     fn default() -> Self {
-        Self { tolerance: Length::Percent(0.2), max_spans: 8, fairness: 1e-6, density: 4 }
+        Self { tolerance: Length::Percent(0.2), max_spans: 8, fairness: 1e-6, density: 4, g1: false }
     }
 }
 
@@ -126,15 +132,15 @@ pub fn fit_patches(
         params.fairness,
         params.fairness >= 0.0 && params.fairness.is_finite(),
     )?;
-    let rules = FitRules { tolerance, max_spans: params.max_spans, fairness: params.fairness, density: params.density };
+    let smooth = params.g1.then_some(SMOOTH);
+    let FitPatchesParams { max_spans, fairness, density, .. } = *params;
+    let rules = FitRules { tolerance, max_spans, fairness, density, smooth };
     let patches = fit(surface, quads, &rules, watch)?;
     let stats = stats(&patches, tolerance);
     Ok((patches, stats))
 }
 
 fn stats(patches: &Patches, tolerance: f64) -> FitPatchesStats {
-    /// Seams of a larger angle are counted; degrees.
-    const SMOOTH: f64 = 2.0;
     let all = &patches.patches;
     let errors: Vec<f64> = all.iter().map(|p| p.rms_error).collect();
     let smooth: Vec<f64> = patches.seams.iter().filter(|s| s.is_smooth).map(|s| s.angle).collect();
@@ -174,7 +180,7 @@ pub struct Step;
 
 impl StepContract for Step {
     const NAME: &'static str = "fit-patches";
-    const REVISION: u32 = 1;
+    const REVISION: u32 = 2;
     const INPUTS: &'static [InputDef] = &[
         InputDef { name: "from", accepts: &[Port::Quads], required: true, doc: "coarse quads with what they cover" },
         InputDef {

@@ -74,7 +74,7 @@ pub struct Step;
 
 impl StepContract for Step {
     const NAME: &'static str = "measure";
-    const REVISION: u32 = 2;
+    const REVISION: u32 = 3;
     const INPUTS: &'static [InputDef] = &[
         InputDef {
             name: "from",

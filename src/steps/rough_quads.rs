@@ -39,7 +39,7 @@ use crate::step::{
     Artifact, ElementRef, InputDef, Inputs, Length, Locks, OutPort, OutputDef, Port, Produced, Step as StepContract,
     StepFailure,
 };
-use crate::technique::belts::{BeltRules, Thickness, cut_belts};
+use crate::technique::belts::{BeltReport, BeltRules, Order, Thickness, cut_belts};
 use crate::technique::layout::optimise::{OptimiseReport, optimise, polygonise};
 use crate::technique::layout::{Ground, Layout, to_quads};
 use crate::watch::{Cancelled, Watch};
@@ -59,7 +59,8 @@ pub struct RoughQuadsParams {
     #[schemars(range(min = 90.0, max = 180.0))]
     pub min_angle: f64,
     /// Whether connectivity is improved after the paper's post-processing: triangles are paired along paths, nodes with
-    /// too many or too few elements are repaired. Default true; `false` is the paper's method.
+    /// too many or too few elements are repaired; of several orders in which belts are cut the best result is
+    /// kept. Default true; `false` is the paper's method, from the outside.
     pub optimize: bool,
 }
 
@@ -156,30 +157,20 @@ pub fn rough_quads(
     let ground = Ground::new(surface);
     let rules = rules(surface, params)?;
     check_borders(&ground)?;
-    let (mut layout, bad, belts) = cut_belts(&ground, &rules, watch)?;
-    let mut stuck = polygonise(&mut layout, watch)?;
-    let mut post_processed = layout.couple_triangles() + layout.open_triangles();
-    post_processed += layout.couple_triangles();
-    let places: Vec<FaceId> = bad.iter().map(|b| b.face).collect();
-    refuse(places)?;
-    let mut report = OptimiseReport::default();
-    if params.optimize {
-        report = optimise(&mut layout, watch)?;
-        stuck = polygonise(&mut layout, watch)?;
-    }
-    refuse(stuck_faces(&layout, &stuck))?;
-    let quads = to_quads(&layout);
-    let Counts { triangles, irregular, forced, vertices } = layout_counts(&quads.mesh);
+    let made =
+        if params.optimize { best(&ground, &rules, params, watch)? } else { attempt(&ground, &rules, params, watch)? };
+    let quads = made.quads;
+    let Counts { triangles, irregular, forced, vertices } = made.counts;
     let elements = quads.mesh.faces.len();
     let stats = RoughQuadsStats {
         domains: ground.domains,
-        strips: belts.strips,
-        belts: belts.belts,
-        connectors: belts.connectors,
-        post_processed,
-        paired_triangles: report.pairs,
-        parity_nodes: report.parity_nodes,
-        edits: report.edits + report.cavities,
+        strips: made.belts.strips,
+        belts: made.belts.belts,
+        connectors: made.belts.connectors,
+        post_processed: made.post_processed,
+        paired_triangles: made.report.pairs,
+        parity_nodes: made.report.parity_nodes,
+        edits: made.report.edits + made.report.cavities,
         quads: elements - triangles,
         triangles,
         triangle_share: triangles as f64 / elements.max(1) as f64,
@@ -188,6 +179,105 @@ pub fn rough_quads(
     };
     Ok((quads, stats))
 }
+
+/// Quads made by one order of the belts.
+struct Attempt {
+    quads: Quads,
+    counts: Counts,
+    belts: BeltReport,
+    post_processed: usize,
+    report: OptimiseReport,
+}
+
+fn attempt(
+    ground: &Ground<'_>,
+    rules: &BeltRules,
+    params: &RoughQuadsParams,
+    watch: &Watch,
+) -> Result<Attempt, RoughQuadsError> {
+    let (mut layout, bad, belts) = cut_belts(ground, rules, watch)?;
+    let mut stuck = polygonise(&mut layout, watch)?;
+    let mut post_processed = layout.couple_triangles() + layout.open_triangles();
+    post_processed += layout.couple_triangles();
+    refuse(bad.iter().map(|b| b.face).collect())?;
+    let mut report = OptimiseReport::default();
+    if params.optimize {
+        report = optimise(&mut layout, watch)?;
+        stuck = polygonise(&mut layout, watch)?;
+    }
+    part_parallels(&mut layout, &mut stuck, watch)?;
+    refuse(stuck_faces(&layout, &stuck))?;
+    let quads = to_quads(&layout);
+    let counts = layout_counts(&quads.mesh);
+    Ok(Attempt { quads, counts, belts, post_processed, report })
+}
+
+/// The best of several ways to cut the belts; the first that is good enough ends the search.
+fn best(
+    ground: &Ground<'_>,
+    rules: &BeltRules,
+    params: &RoughQuadsParams,
+    watch: &Watch,
+) -> Result<Attempt, RoughQuadsError> {
+    const WAYS: [(Order, f64); 4] =
+        [(Order::FromOutside, SNAP), (Order::FromBorders, 0.5), (Order::FromOutside, 0.5), (Order::FromBorders, SNAP)];
+    let mut found: Option<Result<Attempt, RoughQuadsError>> = None;
+    for (order, snap) in WAYS {
+        let made = attempt(ground, &BeltRules { order, snap, ..*rules }, params, watch);
+        if let Err(RoughQuadsError::Cancelled(cancelled)) = made {
+            return Err(cancelled.into());
+        }
+        let is_better = match (&made, &found) {
+            (_, None) | (Ok(_), Some(Err(_))) => true,
+            (Ok(made), Some(Ok(found))) => made.shares() < found.shares(),
+            (Err(_), Some(_)) => false,
+        };
+        let is_good = made.as_ref().is_ok_and(Attempt::is_good);
+        if is_better {
+            found = Some(made);
+        }
+        if is_good {
+            break;
+        }
+    }
+    found.unwrap_or(Err(RoughQuadsError::TooCoarse { faces: Vec::new() }))
+}
+
+impl Attempt {
+    /// The shares of triangles and of irregular vertices.
+    fn shares(&self) -> [f64; 2] {
+        let share = |count: usize, of: usize| count as f64 / of.max(1) as f64;
+        let Counts { triangles, irregular, vertices, .. } = &self.counts;
+        [share(*triangles, self.quads.mesh.faces.len()), share(irregular.len(), *vertices)]
+    }
+
+    /// Whether another way is not worth its time.
+    fn is_good(&self) -> bool {
+        /// Shares that the paper's own examples keep.
+        const GOOD: [f64; 2] = [0.03, 0.1];
+        let [triangles, irregular] = self.shares();
+        let forced = self.counts.forced as f64 / self.counts.vertices.max(1) as f64;
+        triangles <= GOOD[0] && irregular <= GOOD[1].max(1.25 * forced)
+    }
+}
+
+/// Parts edges between the same two nodes, and what becomes of the cells beside them.
+fn part_parallels(layout: &mut Layout<'_>, stuck: &mut Vec<u32>, watch: &Watch) -> Result<(), Cancelled> {
+    /// Cutting the cells beside may make new ones.
+    const ROUNDS: usize = 4;
+    for _ in 0..ROUNDS {
+        if layout.part_parallels() == 0 {
+            break;
+        }
+        *stuck = polygonise(layout, watch)?;
+        layout.couple_triangles();
+    }
+    Ok(())
+}
+
+/// How near to a node, as a share of the interval, a connector joins it; less leaves rows apart that should be one, more
+/// makes rows meet that should run on.
+const SNAP: f64 = 0.4;
 
 fn rules(surface: &Surface, params: &RoughQuadsParams) -> Result<BeltRules, RoughQuadsError> {
     let diagonal = Aabb::of(surface.points.iter().copied()).diagonal();
@@ -209,7 +299,7 @@ fn rules(surface: &Surface, params: &RoughQuadsParams) -> Result<BeltRules, Roug
             Thickness::Length(length)
         }
     };
-    Ok(BeltRules { thickness, interval, min_angle: params.min_angle })
+    Ok(BeltRules { thickness, interval, min_angle: params.min_angle, order: Order::FromOutside, snap: SNAP })
 }
 
 /// Each part must have a border.
@@ -266,7 +356,7 @@ pub struct Step;
 
 impl StepContract for Step {
     const NAME: &'static str = "rough-quads";
-    const REVISION: u32 = 1;
+    const REVISION: u32 = 2;
     const INPUTS: &'static [InputDef] = &[InputDef {
         name: "from",
         accepts: &[Port::Surface],

@@ -40,22 +40,60 @@ pub struct Said {
 struct Stamp {
     files: Vec<(PathBuf, Stat)>,
     said: Said,
+    /// The record of the run, which tells what the last run did; and a file of the store that the next run puts in
+    /// its place, for it will have done nothing.
+    #[serde(default)]
+    record: Option<Record>,
+}
+
+/// The record of a run, as it is and as the next run leaves it.
+#[derive(Serialize, Deserialize)]
+struct Record {
+    path: PathBuf,
+    now: Stat,
+    next: PathBuf,
+    then: Stat,
+}
+
+impl Record {
+    /// Puts the next record in place, where that has not been done. False where neither is there.
+    fn advance(&self) -> bool {
+        let is = |path: &Path, known: Stat| fs::metadata(path).is_ok_and(|meta| stat(&meta) == known);
+        if is(&self.path, self.then) {
+            return true;
+        }
+        // Between two file systems this fails; then the run looks at every task and writes the record itself.
+        is(&self.path, self.now) && is(&self.next, self.then) && fs::rename(&self.next, &self.path).is_ok()
+    }
 }
 
 impl Store {
-    /// What the run of this identity said, if all that it read and wrote is as it was.
+    /// What the run of this identity said, if all that it read and wrote is as it was. The first time it writes the
+    /// record of a run that did nothing.
     pub fn unchanged(&self, identity: &Hash) -> Option<Said> {
         let stamp: Stamp = serde_json::from_slice(&fs::read(self.stamp_file(identity)).ok()?).ok()?;
         let same = |(path, known): &(PathBuf, Stat)| fs::metadata(path).is_ok_and(|meta| stat(&meta) == *known);
-        stamp.files.iter().all(same).then_some(stamp.said)
+        if !stamp.files.iter().all(same) {
+            return None;
+        }
+        stamp.record.is_none_or(|record| record.advance()).then_some(stamp.said)
     }
 
-    /// Remembers a run by its files. Does nothing where a file cannot be trusted; failing to write costs time later and
+    /// Remembers a run by its files, and its record with the text that the next run puts there. Does nothing where a file cannot be trusted; failing to write costs time later and
     /// nothing else.
-    pub fn stamp(&self, identity: &Hash, files: Vec<PathBuf>, said: Said) {
-        let Some(files) = trusted(files) else { return };
+    pub fn stamp(&self, identity: &Hash, files: Vec<PathBuf>, said: Said, record: Option<(PathBuf, String)>) {
         let path = self.stamp_file(identity);
-        if let Ok(bytes) = serde_json::to_vec(&Stamp { files, said })
+        let next = path.with_extension("ron");
+        let record = record.map(|(place, text)| {
+            self.write_whole(&next, text.as_bytes()).ok()?;
+            let known = |path: &Path| fs::metadata(path).ok().map(|meta| stat(&meta));
+            let path = std::path::absolute(place).ok()?;
+            Some(Record { now: known(&path)?, path, then: known(&next)?, next: next.clone() })
+        });
+        let (Some(files), Some(record)) = (trusted(files), record.map_or(Some(None), |record| record.map(Some))) else {
+            return;
+        };
+        if let Ok(bytes) = serde_json::to_vec(&Stamp { files, said, record })
             && let Err(error) = self.write_whole(&path, &bytes)
         {
             tracing::warn!(%error, "the stamp of the run was not saved");
@@ -142,16 +180,32 @@ mod tests {
         let said = Said { out: "done".to_owned(), ..Said::default() };
         let id = identity(&[b"run"]);
         assert_ne!(id, identity(&[b"ru", b"n"]));
-        store.stamp(&id, vec![a.clone(), b.clone()], said.clone());
+        store.stamp(&id, vec![a.clone(), b.clone()], said.clone(), None);
         assert_eq!(store.unchanged(&id), Some(said.clone()));
         assert_eq!(store.unchanged(&identity(&[b"other"])), None);
         fs::write(&b, "3").unwrap();
         assert_eq!(store.unchanged(&id), None);
-        store.stamp(&id, vec![a.clone(), b], said.clone());
+        store.stamp(&id, vec![a.clone(), b], said.clone(), None);
         assert_eq!(store.unchanged(&id).as_ref(), Some(&said));
         fs::remove_file(&a).unwrap();
         assert_eq!(store.unchanged(&id), None);
-        store.stamp(&id, vec![a], said);
+        store.stamp(&id, vec![a], said, None);
+        assert_eq!(store.unchanged(&id), None);
+    }
+
+    #[test]
+    fn the_record_is_replaced_once() {
+        let folder = tempfile::tempdir().unwrap();
+        let store = Store::open(&folder.path().join("cache")).unwrap();
+        let record = folder.path().join("run.ron");
+        fs::write(&record, "done").unwrap();
+        let id = identity(&[b"run"]);
+        store.stamp(&id, Vec::new(), Said::default(), Some((record.clone(), "cached".to_owned())));
+        for _ in 0..2 {
+            assert_eq!(store.unchanged(&id), Some(Said::default()));
+            assert_eq!(fs::read_to_string(&record).unwrap(), "cached");
+        }
+        fs::write(&record, "other").unwrap();
         assert_eq!(store.unchanged(&id), None);
     }
 
@@ -168,10 +222,10 @@ mod tests {
         };
         let id = identity(&[b"run"]);
         whole(0);
-        store.stamp(&id, vec![file.clone()], Said::default());
+        store.stamp(&id, vec![file.clone()], Said::default(), None);
         assert_eq!(store.unchanged(&id), None);
         whole(10);
-        store.stamp(&id, vec![file.clone()], Said::default());
+        store.stamp(&id, vec![file.clone()], Said::default(), None);
         assert_eq!(store.unchanged(&id), Some(Said::default()));
     }
 }

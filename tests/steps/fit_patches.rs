@@ -55,3 +55,15 @@ fn another_surface_is_an_error() {
     let failure = run_locked("fit-patches", "main", "", "", &given).unwrap_err();
     assert!(failure.message.contains("which faces they cover"), "{failure}");
 }
+
+#[test]
+fn smooth_seams_get_common_tangent_planes() {
+    let from = surface(sheet());
+    let given = [("from", rough(&from)), ("surface", from.clone())];
+    let made = |params: &str| run_locked("fit-patches", "main", params, "", &given).unwrap().stats;
+    let (plain, smooth) = (made("g1 = false"), made("g1 = true"));
+    assert!(plain["max-seam-angle"].as_f64() > Some(2.0), "{plain}");
+    assert!(smooth["max-seam-angle"].as_f64() <= Some(2.0), "{smooth}");
+    assert_eq!(smooth["seams-beyond"], 0, "{smooth}");
+    assert!(smooth["max-error"].as_f64() <= smooth["tolerance"].as_f64(), "{smooth}");
+}

@@ -99,6 +99,17 @@ fn a_grid_and_an_annulus_are_all_quads_and_nearly_regular() {
 }
 
 #[test]
+fn rows_run_through_an_annulus_from_rim_to_rim() {
+    let from = annulus(120, 24);
+    for optimize in [false, true] {
+        let made = run("rough-quads", &format!("interval = 0.34, optimize = {optimize}"), &surface(from.clone()));
+        check(&from, quads(&made.artifact));
+        assert_eq!(made.stats["triangles"], 0);
+        assert_eq!(share(&made.stats, "irregular-share"), 0.0, "{}", made.stats);
+    }
+}
+
+#[test]
 fn every_mode_gives_a_complex_on_plates_with_corners_and_holes() {
     let hole = |x: f64, y: f64, at: f64| (x - at).abs() < 0.125 && (y - 0.5).abs() < 0.125;
     let plates = [plate(48, |x, y| x < 0.5 || y < 0.5), plate(48, |x, y| !hole(x, y, 0.25) && !hole(x, y, 0.75))];

@@ -101,12 +101,7 @@ pub fn html(
         chosen.show_cases(table, &options.steps);
     }
     let gathered = meshes::gather(case, &chosen, library);
-    let mut environment = Environment::new();
-    environment.set_auto_escape_callback(|_| AutoEscape::Html);
-    environment.set_trim_blocks(true);
-    environment.set_lstrip_blocks(true);
-    environment.add_template("page.html", include_str!("page.html"))?;
-    environment.add_template("sweep.html", include_str!("sweep.html"))?;
+    let environment = environment()?;
     let data = serde_json::to_string(&gathered.viewer(&chosen, case))?;
     let page = environment.get_template("page.html")?.render(context! {
         style => include_str!("page.css"),
@@ -129,4 +124,15 @@ pub fn html(
         quality => chart::stops(&ramp::QUALITY),
     })?;
     Ok(page)
+}
+
+/// The templates of the page.
+fn environment() -> Result<Environment<'static>, PageError> {
+    let mut environment = Environment::new();
+    environment.set_auto_escape_callback(|_| AutoEscape::Html);
+    environment.set_trim_blocks(true);
+    environment.set_lstrip_blocks(true);
+    environment.add_template("page.html", include_str!("page.html"))?;
+    environment.add_template("sweep.html", include_str!("sweep.html"))?;
+    Ok(environment)
 }

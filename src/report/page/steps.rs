@@ -17,6 +17,7 @@ use crate::metric::registry::{METRICS, MetricDef};
 use crate::report::table::state_text;
 use crate::report::{CaseReport, Report, StepReport, in_case};
 use crate::run::TaskState;
+use crate::step::StepFailure;
 
 /// Metrics that are shown at once; the others stand in the table of all.
 const MAIN: [&str; 18] = [
@@ -114,19 +115,13 @@ fn step_view(
     // A table of metrics is that of the mesh before, so there is nothing to set beside it.
     let previous = outline.previous.get(&step.name).filter(|_| known.is_some());
     let before = previous.and_then(|name| Some((name.as_str(), &**gathered.meshes.get(name)?)));
-    let class = match state {
-        TaskState::Done => "done",
-        TaskState::Cached => "cached",
-        TaskState::Failed => "failed",
-        _ => "idle",
-    };
     let picture = known.map(|known| STANDARD.encode(&known.picture)).unwrap_or_default();
     StepView {
         id: anchor(&step.name),
         name: step.name.clone(),
         kind: step.kind.clone(),
         state: state_text(state),
-        class,
+        class: class(state),
         time: if state.is_available() { seconds(time) } else { String::new() },
         port: step.figures.as_ref().map(|figures| figures.port.clone()).unwrap_or_default(),
         key: step.key.clone().unwrap_or_default(),
@@ -134,20 +129,29 @@ fn step_view(
         inputs: step.inputs.iter().map(|(input, from)| (input.clone(), file_name(from).to_owned())).collect(),
         parameters: step.key.as_ref().map(|key| library.parameters(key)).unwrap_or_default(),
         statistics: step.stats.as_ref().map(flat).unwrap_or_default(),
-        failure: step.failure.as_ref().map(|failure| Failure {
-            message: failure.message.clone(),
-            help: failure.help.clone().unwrap_or_default(),
-        }),
+        failure: step.failure.as_ref().map(failure_view),
         previous: previous.cloned().unwrap_or_default(),
         metrics: metrics(step, known, before.map(|(_, before)| before)),
         charts: known.map(|known| charts(&known.shapes, before)).unwrap_or_default(),
-        worst: known
-            .map(|known| known.worst.iter().map(|list| worst_view(list, &step.name)).collect())
-            .unwrap_or_default(),
+        worst: known.into_iter().flat_map(|known| &known.worst).map(|list| worst_view(list, &step.name)).collect(),
         picture,
         in_viewer: outline.shown.contains(&step.name) && known.is_some(),
         gone: known.is_none() && super::outline::has_mesh(step),
     }
+}
+
+/// How the page shows a state.
+fn class(state: TaskState) -> &'static str {
+    match state {
+        TaskState::Done => "done",
+        TaskState::Cached => "cached",
+        TaskState::Failed => "failed",
+        _ => "idle",
+    }
+}
+
+fn failure_view(failure: &StepFailure) -> Failure {
+    Failure { message: failure.message.clone(), help: failure.help.clone().unwrap_or_default() }
 }
 
 fn metrics(step: &StepReport, known: Option<&Known>, before: Option<&Known>) -> Vec<MetricView> {

@@ -62,7 +62,7 @@ fn encode(pixels: &[u8], [width, height]: [u32; 2], note: &str) -> Result<Vec<u8
     let mut encoder = png::Encoder::new(&mut bytes, width, height);
     encoder.set_color(png::ColorType::Rgba);
     encoder.set_depth(png::BitDepth::Eight);
-    encoder.set_compression(png::Compression::High);
+    encoder.set_compression(png::Compression::Fast);
     encoder.add_text_chunk("Software".to_owned(), note.to_owned())?;
     let mut writer = encoder.write_header()?;
     writer.write_image_data(pixels)?;

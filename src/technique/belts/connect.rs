@@ -14,9 +14,6 @@ use crate::mesh::carried::edge_key;
 use crate::mesh::{FaceId, VertexId};
 use crate::technique::layout::{Terrain, along};
 
-/// A connector ends at a node within this share of the interval of where its walk arrives, if there is one.
-const SNAP: f64 = 0.5;
-
 /// Where a walk came to.
 enum Arrival {
     /// Near this vertex of the inner loop.
@@ -52,7 +49,7 @@ impl Draft<'_> {
             } else if is_sampled && !on_spine {
                 1.0
             } else {
-                SNAP
+                self.snap
             };
             was_laid = self.connector(belt, outer.vertices[place], bisector, &is_inner, &mut ends, snap);
         }

@@ -4,6 +4,7 @@ use rustc_hash::FxHashMap;
 
 use super::sample::{Rope, fill_gaps, forced};
 use super::strips::{Belts, border_loops};
+use super::{BeltRules, Order};
 use crate::mesh::carried::{EdgeKey, edge_key};
 use crate::mesh::id::Vertex;
 use crate::mesh::{FaceId, IdVec, VertexId};
@@ -17,6 +18,8 @@ pub(super) struct Draft<'g> {
     pub(super) interval: f64,
     /// Connectors start where the angle is at least this, in radians.
     pub(super) min_angle: f64,
+    /// See [`BeltRules::snap`].
+    pub(super) snap: f64,
     pub(super) node: IdVec<Vertex, bool>,
     pub(super) fixed: IdVec<Vertex, bool>,
     /// Edges laid, with the inner end of their path.
@@ -30,12 +33,13 @@ pub(super) struct Draft<'g> {
 }
 
 impl<'g> Draft<'g> {
-    pub(super) fn new(ground: &'g Ground<'g>, belts: Belts, interval: f64, min_angle: f64) -> Self {
-        let (node, fixed) = forced(ground, &belts, interval);
+    pub(super) fn new(ground: &'g Ground<'g>, belts: Belts, rules: &BeltRules) -> Self {
+        let (node, fixed) = forced(ground, &belts, rules.interval);
         Self {
             ground,
-            interval,
-            min_angle,
+            interval: rules.interval,
+            min_angle: rules.min_angle.to_radians(),
+            snap: rules.snap,
             node,
             fixed,
             walls: FxHashMap::default(),
@@ -47,8 +51,9 @@ impl<'g> Draft<'g> {
         }
     }
 
-    /// Cuts all belts, from the border inwards, of equal ones the longest first.
-    pub(super) fn run(&mut self, watch: &Watch) -> Result<(), Cancelled> {
+    /// Cuts all belts, from the border inwards, of equal ones the longest first; from outside those wait whose outer
+    /// loop is not cut yet.
+    pub(super) fn run(&mut self, rule: Order, watch: &Watch) -> Result<(), Cancelled> {
         let mut loops: Vec<Vec<Vec<Side>>> = vec![Vec::new(); self.belts.count];
         for sides in border_loops(self.ground, &self.belts.of) {
             loops[self.belts.of[sides[0].face] as usize].push(sides);
@@ -62,13 +67,35 @@ impl<'g> Draft<'g> {
         }
         order.sort_unstable();
         watch.phase("belts", Some(order.len() as u64));
-        for (count, (_, _, belt)) in order.into_iter().enumerate() {
+        let waits_for: Vec<Vec<u32>> = match rule {
+            Order::FromBorders => vec![Vec::new(); loops.len()],
+            Order::FromOutside => loops.iter().map(|own| self.beyond_outer(own)).collect(),
+        };
+        for count in 0..order.len() {
             watch.check()?;
             watch.advance(count as u64, || format!("{} connectors", self.connectors));
+            let is_ready =
+                |entry: &(u64, u64, usize)| waits_for[entry.2].iter().all(|&other| self.done[other as usize]);
+            let (_, _, belt) = order.remove(order.iter().position(is_ready).unwrap_or(0));
             self.cut_belt(belt as u32, std::mem::take(&mut loops[belt]));
             self.done[belt] = true;
         }
         Ok(())
+    }
+
+    /// The belts of the same domain beyond the longest of these loops.
+    fn beyond_outer(&self, loops: &[Vec<Side>]) -> Vec<u32> {
+        let length = |sides: &&Vec<Side>| Rope::new(self.ground, sides).length;
+        // Of equal ones the first, as when the belt is cut.
+        let outer = loops.iter().rev().max_by(|a, b| length(a).total_cmp(&length(b)));
+        let beyond = |side: &Side| {
+            let face = self.ground.beyond(*side)?;
+            (self.ground.domain[face] == self.ground.domain[side.face]).then(|| self.belts.of[face])
+        };
+        let mut all: Vec<u32> = outer.into_iter().flatten().filter_map(beyond).collect();
+        all.sort_unstable();
+        all.dedup();
+        all
     }
 
     fn cut_belt(&mut self, belt: u32, mut loops: Vec<Vec<Side>>) {

@@ -27,6 +27,19 @@ pub struct BeltRules {
     pub interval: f64,
     /// Connectors start where the angle is at least this; degrees.
     pub min_angle: f64,
+    /// Which belts come first.
+    pub order: Order,
+    /// A connector ends at a node within this share of the interval of where its walk arrives, if there is one.
+    pub snap: f64,
+}
+
+/// In which order belts are cut. A loop between two belts gets its nodes from the one that is cut first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Order {
+    /// A belt waits until all beyond its outer loop are cut, so that rows run through from the outside to the holes.
+    FromOutside,
+    /// From all borders inwards, so that nodes lie evenly on every border.
+    FromBorders,
 }
 
 /// What was made on the way.
@@ -51,8 +64,8 @@ pub fn cut_belts<'g>(
 ) -> Result<(Layout<'g>, Vec<NotADisk>, BeltReport), Cancelled> {
     let belts = strips::belts(ground, rules.thickness, mean_edge(ground));
     let (strips, count) = (belts.strips, belts.count);
-    let mut draft = draft::Draft::new(ground, belts, rules.interval, rules.min_angle.to_radians());
-    draft.run(watch)?;
+    let mut draft = draft::Draft::new(ground, belts, rules);
+    draft.run(rules.order, watch)?;
     let report = BeltReport { strips, belts: count, connectors: draft.connectors };
     loop {
         let (cell, count) = cells(&draft);

@@ -16,6 +16,7 @@ pub mod export;
 pub mod finder;
 pub mod ground;
 pub mod optimise;
+mod parallel;
 pub mod pattern;
 pub mod polygon;
 pub mod proposal;

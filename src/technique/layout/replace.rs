@@ -11,6 +11,7 @@ use super::ground::Side;
 use super::pattern::{Part, Pattern};
 use super::{Corner, Layout};
 use crate::mesh::{FaceId, VertexId};
+use glam::DVec3;
 
 /// What a change removed, to bring it back.
 #[derive(Clone, Debug, Default)]
@@ -165,6 +166,31 @@ impl Layout<'_> {
         is_cut.then_some((left, right))
     }
 
+    /// The vertex inside a cell, away from `taken`, that walking from the end of `taken` downhill leads to; `None` where
+    /// the rim of the cell stands in the way.
+    fn descend(&self, cell: u32, target: DVec3, taken: &[VertexId]) -> Option<VertexId> {
+        let distance = |v: VertexId| self.ground.point(v).distance_squared(target);
+        let mut at = *taken.last()?;
+        let mut least = f64::INFINITY;
+        loop {
+            let (mut next, mut is_barred) = (None, false);
+            for (v, _, _) in self.ground.leaving(at) {
+                let d = distance(v);
+                if d < least || (d == least && next.is_some_and(|n| v < n)) {
+                    if self.is_inside(v, cell) && !taken.contains(&v) {
+                        (least, next) = (d, Some(v));
+                    } else {
+                        is_barred = true;
+                    }
+                }
+            }
+            match next {
+                Some(v) => at = v,
+                None => return (!is_barred && !taken.contains(&at)).then_some(at),
+            }
+        }
+    }
+
     /// A short path between two vertices through the inside of a cell, away from `taken`.
     fn join(&mut self, cell: u32, from: VertexId, to: VertexId, taken: &[VertexId]) -> Option<Vec<VertexId>> {
         let mut finder = std::mem::take(&mut self.finder);
@@ -238,6 +264,10 @@ impl<'p> Fill<'p> {
     /// The free vertex inside a cell that is nearest to where node `n` should lie.
     fn place(&mut self, layout: &Layout<'_>, cell: u32, n: usize, taken: &[VertexId]) -> Option<VertexId> {
         let target = self.pattern.inner[n - self.pattern.rim];
+        if let Some(near) = layout.descend(cell, target, taken) {
+            self.places[n] = Some(near);
+            return Some(near);
+        }
         let mut best: Option<(f64, VertexId)> = None;
         for v in layout.faces(cell).iter().flat_map(|&f| layout.ground.surface.faces[f]) {
             let distance = layout.ground.point(v).distance_squared(target);

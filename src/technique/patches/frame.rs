@@ -3,6 +3,7 @@
 use rustc_hash::FxHashMap;
 
 use crate::mesh::carried::{EdgeKey, edge_key};
+use crate::mesh::geometry::angle;
 use crate::mesh::{Cover, FaceId, IdVec, MarkCause, Quads, Surface, VertexId};
 use crate::technique::layout::{Ground, Layout};
 
@@ -75,15 +76,25 @@ pub(super) fn frame<'g>(ground: &'g Ground<'g>, quads: &Quads) -> Result<Frame<'
     Ok(Frame { layout, arcs, sides })
 }
 
-/// Whether no mark and no border of a domain runs along a path.
+/// Whether no marked edge but the border of a region runs along a path, and the mesh does not bend there.
 fn is_smooth(ground: &Ground<'_>, path: &[VertexId]) -> bool {
+    /// Mean angle between the faces on both sides of a path from which on it counts as an edge of the shape; degrees.
+    const SHARP: f64 = 20.0;
     let marks = &ground.surface.carried.marks;
-    path.windows(2).all(|w| {
-        let is_marked = marks.get(&edge_key(w[0], w[1])).is_some_and(|m| m.cause != MarkCause::Boundary);
+    let is_crease = |cause| !matches!(cause, MarkCause::Boundary | MarkCause::RegionBorder);
+    let (mut bend, mut length) = (0.0, 0.0);
+    for w in path.windows(2) {
+        let is_marked = marks.get(&edge_key(w[0], w[1])).is_some_and(|m| is_crease(m.cause));
         let side = ground.side_between(w[0], w[1]).or_else(|| ground.side_between(w[1], w[0]));
-        let beyond = side.and_then(|s| ground.beyond(s).map(|f| (s.face, f)));
-        !is_marked && beyond.is_some_and(|(a, b)| ground.domain[a] == ground.domain[b])
-    })
+        let Some((a, b)) = side.and_then(|s| ground.beyond(s).map(|f| (s.face, f))) else { return false };
+        if is_marked {
+            return false;
+        }
+        let edge = ground.point(w[0]).distance(ground.point(w[1]));
+        bend += edge * angle(ground.normal(a), ground.normal(b)).to_degrees();
+        length += edge;
+    }
+    bend <= SHARP * length
 }
 
 fn embed<'g>(ground: &'g Ground<'g>, quads: &Quads, cover: &Cover) -> Result<Layout<'g>, FrameError> {

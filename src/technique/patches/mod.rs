@@ -3,7 +3,10 @@
 //! The common curves come first, least squares over the path with both ends fixed, so that neighbours share them; then
 //! the control points inside, least squares over the covered vertices with a thin-plate term, whose parameters are then
 //! corrected to the feet of the vertices and the fit repeated. A patch farther from its vertices than the tolerance gets
-//! twice the spans. Patches meet in common curves; the angle between their tangent planes is measured, not enforced.
+//! twice the spans. Patches meet in common curves; the angle between their tangent planes is measured. On demand smooth
+//! seams get a common plane at each of their points: curves leave their nodes in one plane, and the control points next
+//! to a seam are drawn into the mean of the planes of both patches, by the same least squares. That is tangent
+//! continuity within a tolerance, not to the last digit, which bicubic patches round any node cannot have.
 //!
 //! Based on: M. Eck, H. Hoppe. Automatic Reconstruction of B-Spline Surfaces of Arbitrary Topological Type. SIGGRAPH,
 //! 1996; J. Hoschek. Intrinsic Parametrization for Approximation. CAGD 5, 1988.
@@ -12,6 +15,7 @@ mod flatten;
 mod frame;
 pub mod sample;
 pub mod solve;
+pub mod tangent;
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -23,7 +27,8 @@ use crate::technique::layout::Ground;
 use crate::watch::{Cancelled, Watch};
 pub use frame::FrameError;
 use frame::{Frame, frame};
-use solve::{Curve, fit_curve, fit_inside};
+use solve::{Curve, fit_curve, fit_curve_with, fit_inside, fit_tangent};
+use tangent::{Tangency, end_planes, is_inside};
 
 /// How patches are fitted.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,6 +41,9 @@ pub struct FitRules {
     pub fairness: f64,
     /// Elements of the tessellation along each side of a patch.
     pub density: usize,
+    /// Largest angle between tangent planes along smooth seams, degrees; beyond it patches are refined. `None`: planes
+    /// are left as they come.
+    pub smooth: Option<f64>,
 }
 
 /// Why nothing was fitted.
@@ -69,9 +77,15 @@ pub fn fit_patches(surface: &Surface, quads: &Quads, rules: &FitRules, watch: &W
     let mut fits: Vec<Fit> = (0..frame.sides.len()).into_par_iter().map(|e| begin(&frame, e)).collect();
     loop {
         watch.check()?;
-        let curves = curves(&frame, &spans, rules);
+        let mut curves = curves(&frame, &spans, rules);
         fits.par_iter_mut().enumerate().for_each(|(e, fit)| fit.solve(&frame, e, spans[e], &curves, rules));
+        if rules.smooth.is_some() {
+            watch.check()?;
+            level(&frame, &mut curves);
+            smooth(&frame, &mut fits, &spans, &curves, rules);
+        }
         let errors = errors(&frame, &fits);
+        let bent = bent(&frame, &fits, rules);
         watch.check()?;
         let mut refined = false;
         for (e, error) in errors.iter().enumerate() {
@@ -79,7 +93,9 @@ pub fn fit_patches(surface: &Surface, quads: &Quads, rules: &FitRules, watch: &W
             fits[e].patch.rms_error = error.1;
             // With fewer than two vertices for each control point the fit would follow the triangles and swing between.
             let unknown = (2 * spans[e] + 1) * (2 * spans[e] + 1);
-            if error.0 > rules.tolerance && 2 * spans[e] <= rules.max_spans && 2 * unknown <= fits[e].points.len() {
+            let has_room = 2 * spans[e] <= rules.max_spans && 2 * unknown <= fits[e].points.len();
+            // More spans follow the facets of a coarse mesh more closely, so bends alone ask for two at most.
+            if (error.0 > rules.tolerance || bent[e] && spans[e] == 1) && has_room {
                 spans[e] *= 2;
                 refined = true;
             }
@@ -100,21 +116,104 @@ fn begin(frame: &Frame<'_>, element: usize) -> Fit {
     Fit { spans: 0, points, places, patch: Patch::default() }
 }
 
+/// The elements with a smooth seam whose planes differ by more than the rules allow.
+fn bent(frame: &Frame<'_>, fits: &[Fit], rules: &FitRules) -> Vec<bool> {
+    let mut bent = vec![false; fits.len()];
+    let Some(most) = rules.smooth else { return bent };
+    for seam in seams(frame, fits).into_iter().filter(|seam| seam.is_smooth && seam.angle > most) {
+        seam.patches.iter().for_each(|&e| bent[e as usize] = true);
+    }
+    bent
+}
+
+/// Curves that leave each node in the planes that their sectors have there.
+fn level(frame: &Frame<'_>, curves: &mut [Curve]) {
+    let planes = end_planes(frame, curves);
+    curves.par_iter_mut().enumerate().for_each(|(arc, curve)| {
+        let n = curve.controls.len();
+        let into = |end: usize, next: usize, normal: Option<DVec3>| {
+            let (from, to) = (curve.controls[end], curve.controls[next]);
+            normal.map(|normal| to - normal * normal.dot(to - from))
+        };
+        let next = [into(0, 1, planes[arc][0]), into(n - 1, n - 2, planes[arc][1])];
+        if next.iter().any(Option::is_some) {
+            *curve = fit_curve_with(&path_points(frame, &frame.arcs[arc]), curve.spans, next);
+        }
+    });
+}
+
+/// Fits the patches again under curves that were levelled, with common planes along smooth seams.
+fn smooth(frame: &Frame<'_>, fits: &mut [Fit], spans: &[usize], curves: &[Curve], rules: &FitRules) {
+    /// Rounds of tangency and corrected parameters.
+    const ROUNDS: usize = 3;
+    fits.par_iter_mut().enumerate().for_each(|(e, fit)| {
+        fit.set_border(frame, e, spans[e], curves);
+        fit_inside(&mut fit.patch, &fit.points, &fit.places, rules.fairness);
+    });
+    // Planes are chosen once: later ones would follow what they made.
+    let normals: Vec<Vec<(f64, DVec3)>> =
+        (0..frame.arcs.len()).into_par_iter().map(|arc| seam_normals(frame, fits, curves, arc)).collect();
+    for _ in 0..ROUNDS {
+        fits.par_iter_mut().enumerate().for_each(|(e, fit)| fit.solve_tangent(frame, e, &normals, rules));
+    }
+}
+
+/// Along a smooth seam: shares of the curve, with the normal midway between both patches and across the curve.
+fn seam_normals(frame: &Frame<'_>, fits: &[Fit], curves: &[Curve], arc: usize) -> Vec<(f64, DVec3)> {
+    if !is_inside(frame, arc) {
+        return Vec::new();
+    }
+    let places = (6 * curves[arc].spans).max(12);
+    let tangent = |t: f64| {
+        let step = 0.25 / places as f64;
+        (curves[arc].point(t + step) - curves[arc].point(t - step)).try_normalize()
+    };
+    let across = |t: f64, normal: DVec3| {
+        let tangent = tangent(t)?;
+        (normal - tangent * normal.dot(tangent)).try_normalize()
+    };
+    let normal_at = |k: usize| {
+        let t = (k as f64 + 0.5) / places as f64;
+        let [a, b] = at_seam(frame, arc, t)?;
+        let [na, nb] = [a, b].map(|(e, uv)| normal(&fits[e].patch, uv));
+        Some((t, across(t, na + nb)?))
+    };
+    let raw: Vec<(f64, DVec3)> = (0..places).filter_map(normal_at).collect();
+    smoothed(&raw).into_iter().filter_map(|(t, normal)| Some((t, across(t, normal)?))).collect()
+}
+
+/// Normals along a seam without what is finer than a parabola, such as the facets of a coarse mesh.
+fn smoothed(normals: &[(f64, DVec3)]) -> Vec<(f64, DVec3)> {
+    let row = |t: f64| nalgebra::Vector3::new(1.0, t, t * t);
+    let (mut matrix, mut right) = (nalgebra::Matrix3::zeros(), nalgebra::Matrix3::zeros());
+    for &(t, n) in normals {
+        matrix += row(t) * row(t).transpose();
+        right += row(t) * nalgebra::Vector3::from(n.to_array()).transpose();
+    }
+    let Some(inverse) = matrix.try_inverse() else { return normals.to_vec() };
+    let solution = inverse * right;
+    let at = |t: f64| DVec3::from_array((solution.transpose() * row(t)).into());
+    normals.iter().filter_map(|&(t, _)| Some((t, at(t).try_normalize()?))).collect()
+}
+
+fn path_points(frame: &Frame<'_>, arc: &frame::Arc) -> Vec<DVec3> {
+    let mut points: Vec<DVec3> = arc.path.iter().map(|&v| frame.layout.ground.point(v)).collect();
+    if points.len() == 2 {
+        points.insert(1, points[0].midpoint(points[1]));
+    }
+    points
+}
+
 /// The curves of all arcs, each with the spans of the finer element beside it.
 fn curves(frame: &Frame<'_>, spans: &[usize], rules: &FitRules) -> Vec<Curve> {
-    let ground = frame.layout.ground;
     let fit = |arc: &frame::Arc| {
         let wanted = arc.beside.iter().map(|&(e, _)| spans[e]).max().unwrap_or(1);
-        let mut points: Vec<DVec3> = arc.path.iter().map(|&v| ground.point(v)).collect();
         let mut count = 1;
         // A curve cannot say more than its path; spans stay powers of two times the least, so that knots are nested.
-        while count < wanted && 2 * count < points.len() {
+        while count < wanted && 2 * count < arc.path.len() {
             count *= 2;
         }
-        if points.len() == 2 {
-            points.insert(1, points[0].midpoint(points[1]));
-        }
-        fit_curve(&points, count.min(wanted).min(rules.max_spans))
+        fit_curve(&path_points(frame, arc), count.min(wanted).min(rules.max_spans))
     };
     frame.arcs.par_iter().map(fit).collect()
 }
@@ -124,6 +223,16 @@ impl Fit {
     fn solve(&mut self, frame: &Frame<'_>, element: usize, spans: usize, curves: &[Curve], rules: &FitRules) {
         /// Rounds of parameter correction; later ones change little.
         const ROUNDS: usize = 3;
+        self.set_border(frame, element, spans, curves);
+        for _ in 0..ROUNDS {
+            fit_inside(&mut self.patch, &self.points, &self.places, rules.fairness);
+            self.correct();
+        }
+        fit_inside(&mut self.patch, &self.points, &self.places, rules.fairness);
+    }
+
+    /// Starts from the curves given.
+    fn set_border(&mut self, frame: &Frame<'_>, element: usize, spans: usize, curves: &[Curve]) {
         let sides = &frame.sides[element];
         // The finest of its curves decides, so that each is reproduced exactly.
         let most = sides.iter().map(|&(arc, _)| curves[arc].spans).max().unwrap_or(1).max(spans);
@@ -139,11 +248,35 @@ impl Fit {
             })
             .collect();
         self.patch = with_border(most, &border);
-        for _ in 0..ROUNDS {
-            fit_inside(&mut self.patch, &self.points, &self.places, rules.fairness);
-            self.correct();
+    }
+
+    /// Fits the inside with the derivatives across smooth seams in the planes given.
+    fn solve_tangent(&mut self, frame: &Frame<'_>, element: usize, normals: &[Vec<(f64, DVec3)>], rules: &FitRules) {
+        /// A slope of one counts as much as a distance of this many times the tolerance: two degrees as three and a half.
+        const REACH: f64 = 100.0;
+        /// The thin-plate term counts more here, for slopes alone leave room to swing.
+        const FAIR: f64 = 1e-3;
+        let sides = &frame.sides[element];
+        let mut planes = Vec::new();
+        for (side, &(arc, is_along)) in sides.iter().enumerate() {
+            for &(t, normal) in &normals[arc] {
+                let place = on_side(side, sides.len(), if is_along { t } else { 1.0 - t });
+                // Of a triangle the side v = 1 is a point, and the last side is u = 0.
+                let is_along_u = side % 2 == 1 || sides.len() == 3 && side == 2;
+                let [_, su, sv] = self.patch.eval(place[0], place[1]);
+                let length = if is_along_u { su } else { sv }.length();
+                if length > 0.0 {
+                    planes.push(Tangency { place, is_along_u, normal: normal / length });
+                }
+            }
         }
-        fit_inside(&mut self.patch, &self.points, &self.places, rules.fairness);
+        if planes.is_empty() {
+            return;
+        }
+        let reach = REACH * rules.tolerance;
+        let fairness = rules.fairness.max(FAIR);
+        fit_tangent(&mut self.patch, &self.points, &self.places, fairness, (&planes, reach));
+        self.correct();
     }
 
     fn correct(&mut self) {

@@ -3,6 +3,7 @@
 use glam::DVec3;
 use nalgebra::{DMatrix, DVector};
 
+use super::tangent::Tangency;
 use crate::mesh::patches::{Patch, basis};
 
 /// A cubic B-spline curve.
@@ -52,6 +53,11 @@ const FAIR_CURVE: f64 = 1e-6;
 
 /// The curve of `spans` that fits points best at their share of the length; its ends are the first and last point.
 pub fn fit_curve(points: &[DVec3], spans: usize) -> Curve {
+    fit_curve_with(points, spans, [None; 2])
+}
+
+/// As [`fit_curve`], where the control points next to the ends may be given.
+pub fn fit_curve_with(points: &[DVec3], spans: usize, next: [Option<DVec3>; 2]) -> Curve {
     let n = spans + 3;
     let (first, last) = (points[0], points[points.len() - 1]);
     let line = |i: usize| first.lerp(last, i as f64 / (n - 1) as f64);
@@ -78,6 +84,11 @@ pub fn fit_curve(points: &[DVec3], spans: usize) -> Curve {
     }
     system.fix(0, first);
     system.fix(n - 1, last);
+    for (place, given) in [1, n - 2].into_iter().zip(next) {
+        if let Some(p) = given {
+            system.fix(place, p);
+        }
+    }
     system.solve().map_or_else(fallback, |controls| Curve { spans, controls })
 }
 
@@ -88,6 +99,8 @@ struct System {
     right: DMatrix<f64>,
     fixed: Vec<Option<DVec3>>,
     fairness: f64,
+    /// Derivatives as weights of points, with the normals that they shall be at right angles to.
+    tangent: Vec<(Vec<(usize, f64)>, DVec3)>,
 }
 
 impl System {
@@ -98,6 +111,7 @@ impl System {
             right: DMatrix::zeros(n, 3),
             fixed: vec![None; n],
             fairness,
+            tangent: Vec::new(),
         }
     }
 
@@ -128,6 +142,9 @@ impl System {
         const ROUNDS: usize = 4;
         let free: Vec<usize> = (0..self.fixed.len()).filter(|&i| self.fixed[i].is_none()).collect();
         let m = free.len();
+        if m == 0 {
+            return self.fixed.iter().copied().collect();
+        }
         let scale = (0..m).map(|k| self.data[(free[k], free[k])]).sum::<f64>() / m.max(1) as f64;
         let weight = self.fairness * scale.max(f64::MIN_POSITIVE);
         let data = DMatrix::from_fn(m, m, |r, c| self.data[(free[r], free[c])]);
@@ -152,8 +169,80 @@ impl System {
     }
 }
 
+impl System {
+    /// The points where derivatives count too, which couples the coordinates.
+    fn solve_tangent(&self) -> Option<Vec<DVec3>> {
+        let free: Vec<usize> = (0..self.fixed.len()).filter(|&i| self.fixed[i].is_none()).collect();
+        let m = free.len();
+        let mut number = vec![None; self.fixed.len()];
+        free.iter().enumerate().for_each(|(k, &i)| number[i] = Some(k));
+        let scale = (0..m).map(|k| self.data[(free[k], free[k])]).sum::<f64>() / m.max(1) as f64;
+        let weight = self.fairness * scale.max(f64::MIN_POSITIVE);
+        let mut matrix = DMatrix::zeros(3 * m, 3 * m);
+        let mut right = DVector::zeros(3 * m);
+        for (r, &i) in free.iter().enumerate() {
+            for j in 0..self.fixed.len() {
+                let value = self.data[(i, j)] + weight * self.fair[(i, j)];
+                for c in 0..3 {
+                    match (number[j], self.fixed[j]) {
+                        (Some(k), _) => matrix[(3 * r + c, 3 * k + c)] += value,
+                        (None, p) => right[3 * r + c] -= value * p.unwrap_or_default()[c],
+                    }
+                }
+            }
+            for c in 0..3 {
+                matrix[(3 * r + c, 3 * r + c)] += 1e-13 * scale;
+                right[3 * r + c] += self.right[(i, c)];
+            }
+        }
+        for (row, normal) in &self.tangent {
+            // What the fixed points give to the slope.
+            let given: f64 = row.iter().filter_map(|&(i, a)| self.fixed[i].map(|p| a * normal.dot(p))).sum();
+            let terms: Vec<(usize, f64)> = row
+                .iter()
+                .filter_map(|&(i, a)| number[i].map(|k| (k, a)))
+                .flat_map(|(k, a)| (0..3).map(move |c| (3 * k + c, a * normal[c])))
+                .collect();
+            for &(p, a) in &terms {
+                right[p] -= a * given;
+                terms.iter().for_each(|&(q, b)| matrix[(p, q)] += a * b);
+            }
+        }
+        let x = matrix.cholesky()?.solve(&right);
+        let mut all: Vec<DVec3> = self.fixed.iter().map(|p| p.unwrap_or_default()).collect();
+        free.iter().enumerate().for_each(|(k, &i)| all[i] = DVec3::new(x[3 * k], x[3 * k + 1], x[3 * k + 2]));
+        all.iter().all(|p| p.is_finite()).then_some(all)
+    }
+}
+
 /// Fills in the inner control points of a patch whose border is given, so that it fits `points` at `places`.
 pub fn fit_inside(patch: &mut Patch, points: &[DVec3], places: &[[f64; 2]], fairness: f64) {
+    if let Some(controls) = system_inside(patch, points, places, fairness).solve() {
+        patch.controls = controls;
+    }
+}
+
+/// As [`fit_inside`], with derivatives across the border drawn into planes: a slope of one counts as a distance of
+/// `reach` at as many samples as there are points.
+pub fn fit_tangent(
+    patch: &mut Patch,
+    points: &[DVec3],
+    places: &[[f64; 2]],
+    fairness: f64,
+    (planes, reach): (&[Tangency], f64),
+) {
+    let mut system = system_inside(patch, points, places, fairness);
+    let weight = reach * reach * points.len().max(1) as f64 / planes.len().max(1) as f64;
+    for plane in planes {
+        let row = slope(patch, plane.place, plane.is_along_u);
+        system.tangent.push((row, plane.normal * weight.sqrt()));
+    }
+    if let Some(controls) = system.solve_tangent() {
+        patch.controls = controls;
+    }
+}
+
+fn system_inside(patch: &Patch, points: &[DVec3], places: &[[f64; 2]], fairness: f64) -> System {
     let (w, h) = (patch.width(), patch.spans[1] + 3);
     let mut system = System::new(w * h, fairness);
     let at = |i: usize, j: usize| j * w + i;
@@ -177,9 +266,14 @@ pub fn fit_inside(patch: &mut Patch, points: &[DVec3], places: &[[f64; 2]], fair
     for (&p, &[u, v]) in points.iter().zip(places) {
         system.sample(&tensor(patch, u, v), p);
     }
-    if let Some(controls) = system.solve() {
-        patch.controls = controls;
-    }
+    system
+}
+
+/// The weights of the control points in a derivative at a place.
+fn slope(patch: &Patch, [u, v]: [f64; 2], is_along_u: bool) -> Vec<(usize, f64)> {
+    let ((i, a, da), (j, b, db)) = (basis(patch.spans[0], u), basis(patch.spans[1], v));
+    let (a, b) = if is_along_u { (da, b) } else { (a, db) };
+    (0..16).map(|k| ((j + k / 4) * patch.width() + i + k % 4, a[k % 4] * b[k / 4])).collect()
 }
 
 /// The weights of the control points in the point at a place.
