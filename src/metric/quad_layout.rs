@@ -58,7 +58,9 @@ fn part_counts(mesh: &Soup, is_pinned: impl Fn(VertexId) -> bool) -> (Vec<Vertex
     let edges = EdgeTable::new(mesh);
     let mut on_border = vec![false; mesh.points.len()];
     for (_, key, _) in edges.iter().filter(|(_, _, sides)| sides.len() == 1) {
-        key.iter().for_each(|v| on_border[v.index()] = true);
+        for v in key {
+            on_border[v.index()] = true;
+        }
     }
     let mut elements = vec![0_usize; mesh.points.len()];
     let mut angles = vec![0.0_f64; mesh.points.len()];

@@ -181,10 +181,10 @@ impl System {
         let mut matrix = DMatrix::zeros(3 * m, 3 * m);
         let mut right = DVector::zeros(3 * m);
         for (r, &i) in free.iter().enumerate() {
-            for j in 0..self.fixed.len() {
+            for (j, &known) in self.fixed.iter().enumerate() {
                 let value = self.data[(i, j)] + weight * self.fair[(i, j)];
                 for c in 0..3 {
-                    match (number[j], self.fixed[j]) {
+                    match (number[j], known) {
                         (Some(k), _) => matrix[(3 * r + c, 3 * k + c)] += value,
                         (None, p) => right[3 * r + c] -= value * p.unwrap_or_default()[c],
                     }
@@ -205,7 +205,9 @@ impl System {
                 .collect();
             for &(p, a) in &terms {
                 right[p] -= a * given;
-                terms.iter().for_each(|&(q, b)| matrix[(p, q)] += a * b);
+                for &(q, b) in &terms {
+                    matrix[(p, q)] += a * b;
+                }
             }
         }
         let x = matrix.cholesky()?.solve(&right);
