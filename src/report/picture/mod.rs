@@ -37,7 +37,7 @@ pub fn png(mesh: &Soup, [width, height]: [u32; 2], note: &str) -> Result<Vec<u8>
     encode(&draw(mesh, [width as usize, height as usize]), [width, height], note)
 }
 
-/// As [`png`], coloured by region instead of quality; faces of neighbouring numbers differ most.
+/// As [`png()`], coloured by region instead of quality; faces of neighbouring numbers differ most.
 ///
 /// # Errors
 /// When the picture has no pixel.

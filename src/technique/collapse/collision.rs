@@ -1,6 +1,6 @@
 //! Whether a changed star would run into the rest of the mesh, by exact tests.
 //!
-//! Candidates come from a tree of boxes ([`super::boxes`]). Most pairs share a corner or an edge and are told apart by
+//! Candidates come from a tree of boxes (`boxes`). Most pairs share a corner or an edge and are told apart by
 //! the side of a plane; what is left goes to exact predicates.
 //! Faces that intersect already do not forbid anything elsewhere: only the new faces of an edit are tested.
 

@@ -11,7 +11,7 @@
 //! ([`crate::mesh::edit`]) and makes no new self-intersection ([`collision`]). Equal input gives equal output: ties go
 //! to the lowest edge number.
 //!
-//! Departure: edges are rated when they come to the top of the queue, not whenever their star changes ([`queue`]); until
+//! Departure: edges are rated when they come to the top of the queue, not whenever their star changes (`queue`); until
 //! then an estimate from their length stands for equation 9. On the million triangles of a scan this takes a third of
 //! the time, and the mean stretch of the result is higher.
 //! Cost: O(F log F), about two ratings a collapse.
