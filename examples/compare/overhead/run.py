@@ -135,7 +135,7 @@ def main():
     print("| " + " | ".join(head) + " |")
     print("|" + "---|" * len(head))
     for name in arguments.tools.split(","):
-        binary = str(Path(arguments.meshmill).resolve()) if name == "meshmill" else shutil.which(name)
+        binary = str(pathlib.Path(arguments.meshmill).resolve()) if name == "meshmill" else shutil.which(name)
         if not binary or not pathlib.Path(binary).exists():
             print(f"| {name} | not installed | | | | | |")
             continue
