@@ -2,6 +2,7 @@
 //!
 //! With `MESHMILL_CORPUS` also the scan of a million triangles.
 
+mod corpus;
 mod shapes;
 
 use std::hint::black_box;
@@ -34,7 +35,7 @@ fn growth(criterion: &mut Criterion) {
             group.throughput(Throughput::Elements(faces as u64));
             group.bench_with_input(BenchmarkId::from_parameter(faces), &surface, |b, s| b.iter(|| run(s, mode)));
         }
-        if let Some(scan) = shapes::from_corpus("cad/crankshaft_scan.stl") {
+        if let Some(scan) = corpus::from_corpus("cad/crankshaft_scan.stl") {
             group.throughput(Throughput::Elements(scan.faces.len() as u64));
             group.bench_with_input("crankshaft-scan", &scan, |b, s| b.iter(|| run(s, mode)));
         }

@@ -1,13 +1,9 @@
-//! Meshes that the benches make themselves, and those of a corpus where there is one.
+//! Meshes that the benches make themselves.
 
 use std::f64::consts::TAU;
-use std::path::Path;
 
 use glam::{DVec3, dvec3};
-use meshmill::format::{Format, read};
 use meshmill::mesh::{Carried, Surface, VertexId};
-use meshmill::steps::repair::{RepairParams, repair};
-use meshmill::watch::Watch;
 
 /// A torus with a little relief, of `4 n²` triangles.
 pub(crate) fn torus(n: u32) -> Surface {
@@ -24,14 +20,4 @@ pub(crate) fn torus(n: u32) -> Surface {
         faces.extend([[a, b, c], [a, c, d]]);
     }
     Surface { points: points.into(), faces: faces.into(), carried: Carried::default() }
-}
-
-/// A repaired mesh of the folder that `MESHMILL_CORPUS` names; `None` where there is none.
-#[allow(dead_code, reason = "not every bench reads a corpus")]
-pub(crate) fn from_corpus(file: &str) -> Option<Surface> {
-    let path = Path::new(&std::env::var_os("MESHMILL_CORPUS")?).join(file);
-    let bytes = std::fs::read(path).ok()?;
-    let watch = Watch::silent();
-    let (soup, _) = read(Format::Stl, &bytes, &watch).ok()?;
-    Some(repair(&soup, &RepairParams::default(), &watch).ok()?.0)
 }
