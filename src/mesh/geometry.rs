@@ -85,6 +85,9 @@ impl Aabb {
     }
 
     /// The squared distance from `point`; 0 inside.
+    ///
+    /// Rounding is monotone, so that it never exceeds `(point - q).length_squared()` for a point `q` of the box: a search
+    /// that passes over boxes farther than the best found so far loses nothing.
     #[inline]
     pub fn distance_squared(&self, point: DVec3) -> f64 {
         (self.min - point).max(point - self.max).max(DVec3::ZERO).length_squared()
@@ -197,13 +200,14 @@ pub struct Nearest {
     pub distance_squared: f64,
 }
 
-/// The point of segment `a b` nearest to `p`.
+/// The point of segment `a b` nearest to `p`. It lies in the segment's box, also after rounding: see
+/// [`Aabb::distance_squared`].
 #[inline]
 pub fn closest_on_segment(p: DVec3, [a, b]: [DVec3; 2]) -> Nearest {
     let d = b - a;
     let squared = d.length_squared();
     let t = if squared > 0.0 { ((p - a).dot(d) / squared).clamp(0.0, 1.0) } else { 0.0 };
-    let point = if t == 1.0 { b } else { a + t * d };
+    let point = if t == 1.0 { b } else { (a + t * d).max(a.min(b)).min(a.max(b)) };
     Nearest { point, weights: [1.0 - t, t, 0.0], distance_squared: (p - point).length_squared() }
 }
 
@@ -213,7 +217,8 @@ const THIN: f64 = 1e-13;
 
 /// The point of the closed triangle nearest to `p`.
 ///
-/// Where `p` lies over the triangle it is the foot on its plane; else it lies on an edge that `p` sees from outside.
+/// Where `p` lies over the triangle it is the foot on its plane; else it lies on an edge that `p` sees from outside. It
+/// lies in the triangle's box, also after rounding: see [`Aabb::distance_squared`].
 #[inline]
 pub fn closest_on_triangle(p: DVec3, [a, b, c]: [DVec3; 3]) -> Nearest {
     let (ab, ac, ap) = (b - a, c - a, p - a);
@@ -226,7 +231,7 @@ pub fn closest_on_triangle(p: DVec3, [a, b, c]: [DVec3; 3]) -> Nearest {
     let u = squared - v - w;
     if !thin && u >= 0.0 && v >= 0.0 && w >= 0.0 {
         let (v, w) = (v / squared, w / squared);
-        let point = a + (v * ab + w * ac);
+        let point = (a + (v * ab + w * ac)).max(a.min(b).min(c)).min(a.max(b).max(c));
         let weights = [(1.0 - v - w).max(0.0), v, w];
         return Nearest { point, weights, distance_squared: (p - point).length_squared() };
     }

@@ -87,7 +87,8 @@ impl Upright {
             return None;
         }
         let weights = [u / sum, v / sum, w / sum];
-        let t = weights[0] * a.z + weights[1] * b.z + weights[2] * c.z;
+        // Adding a zero makes -0 a 0: hits at one place are equal whatever the sign of the weights.
+        let t = weights[0] * a.z + weights[1] * b.z + weights[2] * c.z + 0.0;
         (t >= 0.0 && t.is_finite()).then_some(RayHit { index, t, weights, front: sum > 0.0 })
     }
 }
