@@ -107,6 +107,46 @@ fn a_damaged_input_exits_with_2() {
 }
 
 #[test]
+fn what_a_failed_run_did_not_write_is_not_left_from_the_last_one() {
+    let desk = Desk::new();
+    desk.meshmill(&["run", "recipe.toml", "--out", "o"]).assert().success();
+    fs::write(desk.path("o/mine.txt"), "mine").unwrap();
+    fs::write(desk.path("o/result.stl"), "changed by hand").unwrap();
+    fs::write(desk.path("cut.obj"), "v 0 0\n").unwrap();
+    desk.meshmill(&["run", "recipe.toml", "--out", "o", "--input", "part=cut.obj"]).assert().code(2);
+    assert_eq!(names(&desk.path("o")), ["mine.txt", "result.stl", "run.ron"], "what somebody made stays");
+}
+
+#[cfg(unix)]
+#[test]
+fn an_output_goes_through_a_link_and_into_a_device() {
+    let desk = Desk::new();
+    fs::create_dir(desk.path("kept")).unwrap();
+    fs::write(desk.path("kept/real.off"), "").unwrap();
+    std::os::unix::fs::symlink("kept/real.off", desk.path("link.off")).unwrap();
+    desk.meshmill(&["convert", "cube.obj", "link.off"]).assert().success();
+    assert!(fs::symlink_metadata(desk.path("link.off")).unwrap().is_symlink());
+    assert!(fs::read(desk.path("kept/real.off")).unwrap().starts_with(b"OFF"));
+}
+
+#[test]
+fn a_part_that_collapses_in_32_bits_is_not_written() {
+    let desk = Desk::new();
+    let far = CUBE.replace("v 0", "v 1e9").replace("v 1 ", "v 1000000001 ");
+    fs::write(desk.path("far.obj"), far).unwrap();
+    let refused = predicate::str::contains("same point in 32 bits").and(predicate::str::contains("origin"));
+    desk.meshmill(&["convert", "far.obj", "far.stl"]).assert().code(4).stderr(refused);
+    desk.meshmill(&["convert", "far.obj", "far.stl", "--text"]).assert().success();
+}
+
+#[test]
+fn a_parameter_that_a_sweep_varies_cannot_be_set() {
+    let desk = Desk::new();
+    let arguments = ["sweep", "recipe.toml", "-s", "limit=0.1,0.2", "--set", "limit=0.3"];
+    desk.meshmill(&arguments).assert().code(2).stderr(predicate::str::contains("-s limit=0.3"));
+}
+
+#[test]
 fn a_cache_that_cannot_be_used_exits_with_6() {
     let desk = Desk::new();
     desk.meshmill(&["run", "recipe.toml", "--cache", "cube.obj"]).assert().code(6);

@@ -6,10 +6,10 @@ use clap::Subcommand;
 use serde_json::json;
 
 use super::Global;
-use super::context::open_store;
+use super::context::{open_store, store_folder};
 use super::exit::{Exit, Fault, data, say};
 use crate::report::table::grouped;
-use crate::store::{CleanReport, GcLimits};
+use crate::store::{CleanReport, GcLimits, Store};
 
 /// Look after the cache.
 #[derive(Debug, clap::Args)]
@@ -45,6 +45,12 @@ enum CacheCommand {
 }
 
 pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Fault> {
+    let root = store_folder(global)?;
+    // Looking makes no cache of a folder that is none.
+    if !Store::is_at(&root) {
+        return Err(Fault::usage(format!("{} is no cache of meshmill", root.display()))
+            .help("a run makes one; name another with --cache DIR"));
+    }
     let store = open_store(global)?;
     match &arguments.command {
         CacheCommand::Stat { json } => {

@@ -46,6 +46,13 @@ impl RecipeArguments {
         &self.recipe
     }
 
+    /// Fails where a parameter is set that a sweep varies: its cases would not look at it.
+    pub(super) fn check_fixed(&self, varied: &[String]) -> Result<(), Fault> {
+        let Some((name, value)) = self.set.iter().find(|(name, _)| varied.contains(name)) else { return Ok(()) };
+        Err(Fault::usage(format!("--set {name}={value}: the sweep varies `{name}`"))
+            .help(format!("`-s {name}={value}` gives it this value in every case")))
+    }
+
     /// Loads the recipe, with further axes of a sweep.
     pub(super) fn load(&self, axes: &[(String, String)]) -> Result<Recipe, Fault> {
         let overrides = Overrides {
@@ -139,18 +146,22 @@ fn check_file(path: &Path) -> Result<(), String> {
 
 /// Opens the cache: `--cache`, else `MESHMILL_CACHE`, else `meshmill` in the user's cache folder.
 pub(super) fn open_store(global: &Global) -> Result<Store, Fault> {
+    Ok(Store::open(&store_folder(global)?)?)
+}
+
+/// Where the cache is or would be.
+pub(super) fn store_folder(global: &Global) -> Result<PathBuf, Fault> {
     let chosen = global.cache.clone().or_else(|| std::env::var_os("MESHMILL_CACHE").map(PathBuf::from));
-    let root = match chosen.filter(|root| !root.as_os_str().is_empty()) {
-        Some(root) => root,
-        None => match etcetera::choose_base_strategy() {
-            Ok(strategy) => strategy.cache_dir().join("meshmill"),
-            Err(error) => {
-                let message = format!("there is no cache folder: {error}");
-                return Err(Fault::new(Exit::Store, message).help("name one with --cache DIR or MESHMILL_CACHE"));
-            }
-        },
-    };
-    Ok(Store::open(&root)?)
+    if let Some(root) = chosen.filter(|root| !root.as_os_str().is_empty()) {
+        return Ok(root);
+    }
+    match etcetera::choose_base_strategy() {
+        Ok(strategy) => Ok(strategy.cache_dir().join("meshmill")),
+        Err(error) => {
+            let message = format!("there is no cache folder: {error}");
+            Err(Fault::new(Exit::Store, message).help("name one with --cache DIR or MESHMILL_CACHE"))
+        }
+    }
 }
 
 pub(super) fn pair(text: &str) -> Result<(String, String), String> {

@@ -31,8 +31,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Fault> {
     let soup = read_mesh(&arguments.from)?;
     let options =
         WriteOptions { binary: !arguments.text, header: format!("meshmill {VERSION}"), ..WriteOptions::default() };
-    let bytes = format::write(format, &soup, &options)
-        .map_err(|error| Fault::new(Exit::Step, format!("cannot write {}: {error}", arguments.to.display())))?;
+    let bytes = format::write(format, &soup, &options).map_err(|error| {
+        let help = error.remedy.clone();
+        Fault::new(Exit::Step, format!("cannot write {}: {error}", arguments.to.display())).help_opt(help)
+    })?;
     write_file(&arguments.to, &bytes)?;
     say(&format!("{}: {} vertices, {} faces", arguments.to.display(), soup.points.len(), soup.faces.len()));
     Ok(Exit::Done)

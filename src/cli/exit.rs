@@ -1,7 +1,8 @@
 //! Exit codes, and faults that end a command: what, where, why, what to try.
 
-use std::io::Write;
+use std::io::{ErrorKind, Write};
 use std::process::ExitCode;
+use std::sync::OnceLock;
 
 use crate::recipe::Diagnostics;
 use crate::report::Status;
@@ -129,9 +130,23 @@ pub(super) fn say(text: &str) {
     let _ = writeln!(anstream::stderr(), "{text}");
 }
 
-/// Data to stdout. A reader that has seen enough, as `head` has, is no error.
+/// The first failure to write to stdout.
+static UNWRITTEN: OnceLock<String> = OnceLock::new();
+
+/// Data to stdout. A reader that has seen enough, as `head` has, is no error; a full disk is, see [`unwritten`].
 pub(super) fn data(text: &str) {
-    let _ = writeln!(anstream::stdout(), "{text}");
+    let mut out = anstream::stdout();
+    if let Err(error) = writeln!(out, "{text}").and_then(|()| out.flush())
+        && error.kind() != ErrorKind::BrokenPipe
+    {
+        let _ = UNWRITTEN.set(error.to_string());
+    }
+}
+
+/// The fault of a command whose data did not reach stdout.
+pub(super) fn unwritten() -> Option<Fault> {
+    let error = UNWRITTEN.get()?;
+    Some(Fault::new(Exit::Store, format!("cannot write to the standard output: {error}")).help("check its free space"))
 }
 
 fn say_error(message: &str, help: Option<&str>) {

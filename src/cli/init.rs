@@ -45,7 +45,13 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Fault> {
     let watch = Watch::new(Arc::new(Silent), Arc::clone(&interrupt.cancelled));
     let Ok(metrics) = measure(&soup, None, &watch) else { return Ok(interrupt.exit()) };
     let input = super::context::relative(&arguments.mesh, out.parent().unwrap_or(Path::new("")));
-    let text = recipe(&name, &input, &soup, &Look::of(&metrics));
+    let look = Look::of(&metrics);
+    // The smallest and the largest lengths whose squares are numbers.
+    if !(1e-100..1e100).contains(&look.diagonal) {
+        let message = format!("{} has a diagonal of {}", arguments.mesh.display(), look.diagonal);
+        return Err(Fault::usage(message).help("the recipe would find no surface in it"));
+    }
+    let text = recipe((&name, &out.display().to_string()), &input, &soup, &look);
     write_file(&out, text.as_bytes())?;
     say(&format!("{}: written; `meshmill run {}` makes the mesh", out.display(), out.display()));
     Ok(Exit::Done)
@@ -56,8 +62,9 @@ struct Look {
     faces: u64,
     diagonal: f64,
     area: f64,
-    min_stretch: f64,
-    mean_edge: f64,
+    /// Of triangles; quads have none.
+    min_stretch: Option<f64>,
+    mean_edge: Option<f64>,
     closed: bool,
     manifold: bool,
     oriented: bool,
@@ -73,8 +80,8 @@ impl Look {
             faces: number("faces") as u64,
             diagonal: number("diagonal"),
             area: number("area"),
-            min_stretch: number("min-stretch"),
-            mean_edge: number("mean-edge"),
+            min_stretch: metrics.get("min-stretch").map(Value::as_f64),
+            mean_edge: metrics.get("mean-edge").map(Value::as_f64),
             closed: number("closed") > 0.0,
             manifold: number("manifold") > 0.0,
             oriented: number("oriented") > 0.0,
@@ -115,7 +122,7 @@ fn quoted(text: &str) -> String {
     toml::Value::from(text).to_string()
 }
 
-fn recipe(name: &str, input: &Path, soup: &Soup, look: &Look) -> String {
+fn recipe((name, file): (&str, &str), input: &Path, soup: &Soup, look: &Look) -> String {
     let size = look.size();
     let length = |percent: f64| number_text(look.diagonal * percent / 100.0);
     let found = findings(soup, look);
@@ -130,9 +137,9 @@ fn recipe(name: &str, input: &Path, soup: &Soup, look: &Look) -> String {
         r#"# Finite-element surface mesh of {input}.
 #
 {found}#
-#   meshmill run {name}.toml                  makes the mesh, in out/{name}
-#   meshmill run {name}.toml --set size=3%    coarser
-#   meshmill sweep {name}.toml                compares a few sizes and tolerances
+#   meshmill run {file}                  makes the mesh, in out/{name}
+#   meshmill run {file} --set size=3%    coarser
+#   meshmill sweep {file}                compares a few sizes and tolerances
 #   meshmill steps NAME                       explains a step
 name = "{name}"
 
@@ -140,7 +147,7 @@ name = "{name}"
 part = {input}
 
 [params]                  # percent of the diagonal, {diagonal}; a number without % is in mesh units
-size = "{size}%"             # aimed edge length, here {aimed}; for about {elements} elements
+size = "{size}%"             # aimed edge length, here {aimed}; {elements} such triangles would cover the part
 tolerance = "{tolerance}%"       # largest distance to the repaired input, here {allowed}
 min-stretch = 0.2         # smallest element quality; 1 is equilateral
 feature-angle = 30        # degrees; sharper edges stay where they are
@@ -216,8 +223,11 @@ fn findings(soup: &Soup, look: &Look) -> String {
         // Writing to a string cannot fail.
         let _ = writeln!(text, "# - {words}");
     };
-    line(format!("{} faces, {} vertices, {} bodies", look.faces, soup.points.len(), look.shells));
-    line(format!("mean edge {}, smallest stretch {}", number_text(look.mean_edge), number_text(look.min_stretch)));
+    let bodies = if look.shells == 1 { "body" } else { "bodies" };
+    line(format!("{} faces, {} vertices, {} {bodies}", look.faces, soup.points.len(), look.shells));
+    if let (Some(edge), Some(stretch)) = (look.mean_edge, look.min_stretch) {
+        line(format!("mean edge {}, smallest stretch {}", number_text(edge), number_text(stretch)));
+    }
     if look.closed {
         line("closed".to_owned());
     } else {

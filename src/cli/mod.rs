@@ -127,7 +127,7 @@ pub fn main() -> ExitCode {
         Err(Fault::new(Exit::Fault, message)
             .help("please report this with the command line; -v tells where it happened"))
     });
-    match result {
+    match result.and_then(|exit| exit::unwritten().map_or(Ok(exit), Err)) {
         Ok(exit) => exit.into(),
         Err(fault) => {
             fault.print();

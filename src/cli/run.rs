@@ -1,5 +1,7 @@
 //! `meshmill run`: a recipe from beginning to end.
 
+use std::collections::BTreeSet;
+use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -117,10 +119,33 @@ pub(super) fn execute(
     let mut report = Report::new(&planned.recipe.name, &planned.plan, &outcome);
     report::describe(&mut report, &planned.recipe);
     if !outcome.cancelled {
+        // Only then: reading the last record of ten thousand steps takes longer than all the rest.
+        if report.status != Status::Done && options.only.is_empty() {
+            remove_stale(&report, &options.out);
+        }
         picture::write(&planned.plan, &outcome, store, pictures)?;
         write_record(&report, &options.out)?;
     }
     Ok((report, outcome.cancelled))
+}
+
+/// Removes what the last run of this folder wrote and this one did not, with its picture, so that nobody takes it for a
+/// result of this one. What somebody has changed since is left, and what cannot be removed too.
+fn remove_stale(report: &Report, out: &Path) {
+    let Ok(text) = fs::read_to_string(out.join("run.ron")) else { return };
+    let Ok(last) = record::from_ron(&text) else { return };
+    let there: BTreeSet<PathBuf> = report.written().collect();
+    for file in last.cases.iter().flat_map(|case| &case.files) {
+        let path = Path::new(&file.path);
+        let Some(content) = file.content.as_ref().filter(|_| !there.contains(path)) else { continue };
+        if fs::read(path).is_ok_and(|bytes| blake3::hash(&bytes).to_hex().as_str() == content) {
+            let _ = fs::remove_file(path);
+            let picture = path.with_extension("png");
+            if !there.contains(&picture) {
+                let _ = fs::remove_file(picture);
+            }
+        }
+    }
 }
 
 /// A run that reports to an observer.
@@ -187,11 +212,21 @@ pub(super) fn tell(report: &Report, json: bool, quiet: bool) -> Result<(), Fault
         }
     }
     match report.status {
-        Status::GateFailed => say("a gate failed; see the table, and the files below failed/"),
+        Status::GateFailed => say(&gates_failed(report)),
         Status::Cancelled => say("interrupted; the next run goes on from the last finished task"),
         Status::Done | Status::Differs | Status::BadInput | Status::StepFailed => {}
     }
     Ok(())
+}
+
+/// Which checks did not hold.
+fn gates_failed(report: &Report) -> String {
+    let sections = report.cases.iter().flat_map(|case| &case.gates);
+    let rows = sections.flat_map(|gate| gate.rows.iter().map(move |row| (gate, row)));
+    let failed: BTreeSet<String> =
+        rows.filter(|(_, row)| !row.passed).map(|(gate, row)| format!("{}: {}", gate.step, row.metric)).collect();
+    let names: Vec<String> = failed.into_iter().collect();
+    format!("a gate failed ({}); see the table, and the files below failed/", names.join(", "))
 }
 
 fn short(hash: &str) -> &str {

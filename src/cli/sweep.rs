@@ -80,6 +80,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Fault>
         return goal::run(arguments, global, recipe, (&store, &options, observer), &interrupt);
     }
     let found = sweep(&recipe, &list_files)?;
+    arguments.recipe.check_fixed(&found.varied)?;
     let plan = plan_cases(&recipe, &found.cases, Some(&found.columns))?;
     if arguments.list {
         let names: Vec<&str> = found.cases.iter().map(|case| case.name.as_str()).collect();

@@ -1,5 +1,7 @@
 //! Numbers of binary formats: a bounds-checked reader in either byte order.
 
+use glam::DVec3;
+
 use super::error::{FormatError, Place, Reason};
 
 /// The order of the bytes in a number.
@@ -122,4 +124,15 @@ pub(super) fn finite(value: f64, what: &'static str, place: Place) -> Result<f64
     }
     Err(FormatError::new(place, Reason::NotFinite { what, found: value.to_string() })
         .with_remedy("the file is damaged, or the program that wrote it computed a wrong number: export it again"))
+}
+/// Whether corners that differ still do so in 32 bits; a part far from the origin collapses there.
+pub(super) fn check_single(corners: [DVec3; 3]) -> Result<(), FormatError> {
+    let narrow = corners.map(DVec3::as_vec3);
+    let collapses = |i: usize, j: usize| narrow[i] == narrow[j] && corners[i] != corners[j];
+    if !(collapses(0, 1) || collapses(1, 2) || collapses(2, 0)) {
+        return Ok(());
+    }
+    let reason = Reason::Collapses { at: corners[0].to_string() };
+    Err(FormatError::new(Place::File, reason)
+        .with_remedy("move the part to the origin, or write text or another format"))
 }

@@ -51,6 +51,12 @@ pub enum Reason {
         /// What the file says.
         found: String,
     },
+    /// Corners that differ would be the same in the format's 32 bits.
+    #[error("the corners of the face at {at} are the same point in 32 bits")]
+    Collapses {
+        /// A corner.
+        at: String,
+    },
     /// A number that points at an element points at none.
     #[error("{what} {index} does not exist; {count} are known here")]
     OutOfRange {

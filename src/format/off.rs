@@ -12,7 +12,7 @@
 
 use glam::DVec3;
 
-use super::binary::{ByteOrder, ByteReader, finite};
+use super::binary::{ByteOrder, ByteReader, check_single, finite};
 use super::builder::Builder;
 use super::error::{FormatError, Place, Reason};
 use super::group_text::{push_groups, read_groups};
@@ -279,6 +279,9 @@ fn write_binary(soup: &Soup) -> Result<Vec<u8>, FormatError> {
         out.extend(narrow.to_be_bytes());
     }
     for facet in &soup.faces {
+        if let [a, b, c, ..] = *facet.corners() {
+            check_single([a, b, c].map(|v| soup.points[v]))?;
+        }
         out.extend((facet.corners().len() as u32).to_be_bytes());
         for vertex in facet.corners() {
             out.extend(vertex.raw().to_be_bytes());

@@ -15,7 +15,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use glam::DVec3;
 
-use super::binary::{ByteOrder, ByteReader, finite};
+use super::binary::{ByteOrder, ByteReader, check_single, finite};
 use super::error::{FormatError, Place, Reason};
 use super::sets::partition;
 use super::text::{Scanner, push_number};
@@ -263,6 +263,7 @@ fn write_binary(soup: &Soup, options: &WriteOptions<'_>) -> Result<Vec<u8>, Form
     out.extend(announced.to_le_bytes());
     for &facet in &soup.faces {
         for triangle in triangles(soup, facet) {
+            check_single(triangle)?;
             for vector in std::iter::once(unit_normal(triangle)).chain(triangle) {
                 for number in vector.to_array() {
                     out.extend(single(number)?.to_le_bytes());

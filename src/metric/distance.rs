@@ -69,6 +69,14 @@ impl Target {
         self.cut.origin[index as usize]
     }
 
+    /// The same about another origin.
+    fn moved(&self, origin: DVec3) -> Self {
+        let mut points = self.points.clone();
+        points.iter_mut().for_each(|p| *p -= origin);
+        let triangles: Vec<[DVec3; 3]> = self.triangles.iter().map(|t| t.map(|p| p - origin)).collect();
+        Self { points, cut: self.cut.clone(), bvh: TriangleBvh::new(triangles.clone()), triangles }
+    }
+
     /// Largest coordinate, for the size of rounding errors.
     fn magnitude(&self) -> f64 {
         let bounds = self.bvh.bounds();
@@ -148,6 +156,11 @@ pub fn one_sided(from: &Target, to: &Target, watch: &Watch) -> Result<Option<One
     if from.triangles.is_empty() || to.triangles.is_empty() {
         return Ok(None);
     }
+    if let Some((origin, [from, to])) = nearer(from, to) {
+        let found = one_sided(&from, &to, watch)?;
+        let lost = rounding_at(origin);
+        return Ok(found.map(|found| OneSided { upper: found.upper + lost, at: found.at + origin, ..found }));
+    }
     let corners = corner_distances(from, to);
     watch.check()?;
     let count = (SAMPLES_A_FACE * from.triangles.len()).clamp(*SAMPLES.start(), *SAMPLES.end());
@@ -195,6 +208,22 @@ fn rounding(from: &Target, to: &Target) -> f64 {
     16.0 * f64::EPSILON * from.magnitude().max(to.magnitude())
 }
 
+/// What moving to an origin so far away may do to a distance.
+fn rounding_at(origin: DVec3) -> f64 {
+    16.0 * f64::EPSILON * origin.abs().max_element()
+}
+
+/// Meshes this many times their size away from the origin are moved there, where fewer digits are lost.
+const FAR: f64 = 100.0;
+
+/// Both meshes moved to the origin by the same vector, where they are far from it.
+fn nearer(from: &Target, to: &Target) -> Option<(DVec3, [Target; 2])> {
+    let bounds = to.bvh.bounds();
+    let origin = 0.5 * (bounds.min + bounds.max);
+    let is_far = origin.is_finite() && origin.abs().max_element() > FAR * bounds.diagonal();
+    is_far.then(|| (origin, [from.moved(origin), to.moved(origin)]))
+}
+
 fn refine_all(
     from: &Target,
     to: &Target,
@@ -233,6 +262,11 @@ pub struct Decision {
 pub fn decide(from: &Target, to: &Target, threshold: f64, watch: &Watch) -> Result<Option<Decision>, Cancelled> {
     if from.triangles.is_empty() || to.triangles.is_empty() {
         return Ok(None);
+    }
+    if let Some((origin, [from, to])) = nearer(from, to) {
+        let mut found = decide(&from, &to, threshold + rounding_at(origin), watch)?;
+        found.iter_mut().flat_map(|found| &mut found.beyond).for_each(|(_, at, _)| *at += origin);
+        return Ok(found);
     }
     let corners = corner_distances(from, to);
     watch.check()?;

@@ -187,6 +187,7 @@ impl Reader<'_, '_> {
             return None;
         }
         let file: PathBuf = path.components().filter(|part| *part != Component::CurDir).collect();
+        self.check_folders(&file, &name, value.span);
         let key = file.to_string_lossy().to_lowercase();
         if let Some(earlier) = self.taken.insert(key, value.span) {
             let problem = Diagnostic::error(value.span, format!("two outputs write the file `{name}`"))
@@ -197,6 +198,20 @@ impl Reader<'_, '_> {
             return None;
         }
         Some(file)
+    }
+
+    /// A file cannot be the folder of another one.
+    fn check_folders(&mut self, file: &Path, name: &str, span: Span) {
+        let lower = |path: &Path| path.to_string_lossy().to_lowercase();
+        let above = file.ancestors().skip(1).find_map(|folder| self.taken.get(&lower(folder)));
+        let below = self.taken.iter().find(|(other, _)| Path::new(other).starts_with(lower(file)));
+        let Some(earlier) = above.copied().or(below.filter(|(other, _)| **other != lower(file)).map(|(_, span)| *span))
+        else {
+            return;
+        };
+        let problem = Diagnostic::error(span, format!("`{name}` would be a file and a folder at once"))
+            .label(earlier, "the other output is here");
+        self.context.problems.push(problem);
     }
 
     /// Whether the ending names a format that what the step gives can be written in.

@@ -13,7 +13,14 @@ const PREFIX: &str = ".meshmill-";
 const STALE: Duration = Duration::from_hours(24);
 
 /// Writes a file so that readers see the old content or all of the new one.
+///
+/// What a symbolic link points at is replaced, not the link. A device or a pipe is written to as it is.
 pub(super) fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    let real = fs::canonicalize(path);
+    let path = real.as_deref().unwrap_or(path);
+    if fs::metadata(path).is_ok_and(|meta| !meta.is_file() && !meta.is_dir()) {
+        return fs::OpenOptions::new().write(true).open(path)?.write_all(bytes);
+    }
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     match write_in(folder, path, bytes) {
         // Another run may have removed the folder while it was empty.

@@ -110,6 +110,11 @@ impl Store {
         Ok(store)
     }
 
+    /// Whether a folder is a store.
+    pub fn is_at(root: &Path) -> bool {
+        root.join(LAYOUT).is_dir()
+    }
+
     /// The folder of this store.
     pub fn root(&self) -> &Path {
         &self.root

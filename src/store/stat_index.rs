@@ -1,7 +1,7 @@
 //! Content hashes of files by their stat, so that an unchanged file is not hashed twice.
 //!
-//! A hash is trusted while path, size, modification time (in nanoseconds) and inode are the same. As in Git's index, a
-//! file that was modified within two seconds before it was hashed is not trusted: it may have changed again within
+//! A hash is trusted while path, size, times of modification and change (in nanoseconds), device and inode are the same.
+//! As in Git's index, a file that was modified within two seconds before it was hashed is not trusted: it may have changed again within
 //! the resolution of the file system's clock. One small file a machine, replaced atomically; of two processes that
 //! write at once one loses its additions, which costs a hashing later and nothing else.
 
@@ -19,6 +19,8 @@ use super::Store;
 
 /// Modified less than this before hashing: not trusted.
 const RACY: Duration = Duration::from_secs(2);
+/// Changed less than this before hashing, as a copy with an old time of modification is: not trusted either.
+const TICK: Duration = Duration::from_millis(20);
 /// The index forgets the longest unused files beyond this number.
 const MAX_FILES: usize = 10_000;
 
@@ -28,13 +30,30 @@ pub(super) struct Stat {
     size: u64,
     /// Nanoseconds since 1970.
     modified: u64,
+    /// The same of the last change of content, name or owner, which no program can set: a copy with an old time of
+    /// modification is told by it.
+    #[serde(default)]
+    changed: u64,
+    #[serde(default)]
+    device: u64,
     inode: u64,
 }
 
 impl Stat {
+    /// The same file with the same content, though perhaps by another name.
+    pub(super) fn is_renamed(self, other: Self) -> bool {
+        Self { changed: 0, ..self } == Self { changed: 0, ..other }
+    }
+
+    /// Time since the last change of content or name.
+    pub(super) fn age(self, now: SystemTime) -> Duration {
+        let now = now.duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
+        now.saturating_sub(Duration::from_nanos(self.modified.max(self.changed)))
+    }
+
     /// Whether its file system tells fractions of a second.
     pub(super) fn has_fractions(self) -> bool {
-        !self.modified.is_multiple_of(1_000_000_000)
+        !(self.modified.is_multiple_of(1_000_000_000) && self.changed.is_multiple_of(1_000_000_000))
     }
 }
 
@@ -116,6 +135,7 @@ impl StatIndex {
         // A time in the future comes from another clock, which says nothing about when the file last changed.
         let settled = meta.modified().ok().and_then(|time| now.duration_since(time).ok()).is_some_and(|age| age > RACY);
         if settled
+            && before.age(now) > TICK
             && stat(&meta) == before
             && let Ok(mut state) = self.state.lock()
         {
@@ -159,17 +179,22 @@ pub(super) fn stat(meta: &fs::Metadata) -> Stat {
         .ok()
         .and_then(|time| time.duration_since(SystemTime::UNIX_EPOCH).ok())
         .map_or(0, |time| u64::try_from(time.as_nanos()).unwrap_or(u64::MAX));
-    Stat { size: meta.len(), modified, inode: inode(meta) }
+    let (changed, device, inode) = identity(meta);
+    Stat { size: meta.len(), modified, changed, device, inode }
 }
 
+/// Nanoseconds of the last change, device and inode.
 #[cfg(unix)]
-fn inode(meta: &fs::Metadata) -> u64 {
-    std::os::unix::fs::MetadataExt::ino(meta)
+fn identity(meta: &fs::Metadata) -> (u64, u64, u64) {
+    use std::os::unix::fs::MetadataExt;
+    let seconds = u64::try_from(meta.ctime()).unwrap_or(0);
+    let nanoseconds = u64::try_from(meta.ctime_nsec()).unwrap_or(0);
+    (seconds.saturating_mul(1_000_000_000).saturating_add(nanoseconds), meta.dev(), meta.ino())
 }
 
 #[cfg(not(unix))]
-fn inode(_meta: &fs::Metadata) -> u64 {
-    0
+fn identity(_meta: &fs::Metadata) -> (u64, u64, u64) {
+    (0, 0, 0)
 }
 
 /// A name for this machine, fit as a file name. Two machines of one name share a file, which the stat keeps safe.

@@ -53,6 +53,19 @@ fn both(a: &Soup, b: &Soup) -> TwoSided {
 }
 
 #[test]
+fn far_from_the_origin_the_bound_is_as_good() {
+    let near = [sphere(1.0, 6), sphere(1.01, 5)];
+    let far = near.clone().map(|mut soup| {
+        soup.points.iter_mut().for_each(|p| *p += dvec3(4e6, -4e6, 1e6));
+        soup
+    });
+    let bound =
+        |[a, b]: &[Soup; 2]| two_sided(&Target::of(a), &Target::of(b), &Watch::silent()).unwrap().unwrap().upper();
+    let (here, there) = (bound(&near), bound(&far));
+    assert!((here - there).abs() < 1e-6, "{here} and {there}");
+}
+
+#[test]
 fn spheres_of_radius_1_and_1_1_are_0_1_apart() {
     let d = both(&sphere(1.0, 24), &sphere(1.1, 24));
     assert!(d.upper() >= d.lower() && d.upper() - d.lower() < 2e-3, "{d:?}");
