@@ -1,5 +1,9 @@
 //! Every step on generated shapes: golden statistics and metrics, the invariants of its head comment, its example.
 
+#![expect(clippy::print_stderr, reason = "a skipped test says so")]
+
+#[path = "common/corpus.rs"]
+mod corpus;
 #[path = "common/levels.rs"]
 mod levels;
 #[path = "common/shapes.rs"]

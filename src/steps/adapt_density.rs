@@ -136,7 +136,7 @@ pub struct Step;
 
 impl StepContract for Step {
     const NAME: &'static str = "adapt-density";
-    const REVISION: u32 = 2;
+    const REVISION: u32 = 3;
     const INPUTS: &'static [InputDef] = &[
         InputDef {
             name: "from",

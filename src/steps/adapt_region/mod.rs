@@ -202,7 +202,7 @@ pub struct Step;
 
 impl StepContract for Step {
     const NAME: &'static str = "adapt-region";
-    const REVISION: u32 = 2;
+    const REVISION: u32 = 3;
     const INPUTS: &'static [InputDef] = &[
         InputDef {
             name: "from",

@@ -3,46 +3,46 @@
 use glam::DVec3;
 
 use crate::mesh::Surface;
+use crate::mesh::bvh::SegmentBvh;
 use crate::metric::distance::{Target, decide, one_sided};
 use crate::technique::mixed::Mixed;
 use crate::watch::{Cancelled, Watch};
 
 /// The surface, ready to be measured against.
 pub(super) struct Check {
-    surface: Target,
+    pub(super) surface: Target,
+    /// The points of the surface.
+    pub(super) corners: SegmentBvh,
 }
 
-/// What a check found.
-pub(super) struct Found {
-    /// A middle, how far about it, and the size that should do there.
-    pub(super) places: Vec<(DVec3, f64, f64)>,
-    /// The largest distance known.
-    pub(super) worst: f64,
+/// A place where quads and surface are too far apart.
+pub(super) struct Fault {
+    /// The face nearest to it.
+    pub(super) face: u32,
+    /// The surface's point there.
+    pub(super) at: DVec3,
+    /// How far.
+    pub(super) distance: f64,
 }
 
 impl Check {
     pub(super) fn new(surface: &Surface) -> Self {
-        Self { surface: Target::of(&surface.to_soup()) }
+        let corners = SegmentBvh::new(surface.points.iter().map(|&p| [p, p]).collect());
+        Self { surface: Target::of(&surface.to_soup()), corners }
     }
 
-    /// The places where quads and surface are farther apart than `tolerance`, by a witness in each face at fault.
-    pub(super) fn beyond(&self, mesh: &Mixed, tolerance: f64, watch: &Watch) -> Result<Found, Cancelled> {
+    /// The places where the mesh and the surface are farther apart than `tolerance`, by a witness in each face at fault.
+    pub(super) fn beyond(&self, mesh: &Mixed, tolerance: f64, watch: &Watch) -> Result<Vec<Fault>, Cancelled> {
         let quads = Target::of(&mesh.leave().0);
         let faces: Vec<u32> = mesh.faces().collect();
-        let mut found = Found { places: Vec::new(), worst: 0.0 };
-        let mut note = |f: u32, distance: f64| {
-            let (sum, n) = mesh.sides(f).fold((0.0, 0.0), |(sum, n), h| (sum + mesh.length(h), n + 1.0));
-            // Between what a round place needs, the square root, and what a pointed one does.
-            let factor = libm::pow(0.75 * tolerance / distance, 0.75).clamp(0.4, 0.82);
-            found.places.push((mesh.centre(f), 1.2 * sum / n, factor * sum / n));
-            found.worst = f64::max(found.worst, distance);
-        };
-        for (face, _, distance) in decide(&quads, &self.surface, tolerance, watch)?.into_iter().flat_map(|d| d.beyond) {
-            note(faces[face.index()], distance);
+        let mut found = Vec::new();
+        for (face, p, distance) in decide(&quads, &self.surface, tolerance, watch)?.into_iter().flat_map(|d| d.beyond) {
+            let at = self.surface.bvh().closest(p).map_or(p, |c| c.nearest.point);
+            found.push(Fault { face: faces[face.index()], at, distance });
         }
         for (_, at, distance) in decide(&self.surface, &quads, tolerance, watch)?.into_iter().flat_map(|d| d.beyond) {
             if let Some(nearest) = quads.bvh().closest(at) {
-                note(faces[quads.face(nearest.index).index()], distance);
+                found.push(Fault { face: faces[quads.face(nearest.index).index()], at, distance });
             }
         }
         Ok(found)
@@ -55,4 +55,25 @@ impl Check {
         let from = one_sided(&self.surface, &quads, watch)?.map_or(0.0, |d| d.upper);
         Ok(to.max(from))
     }
+}
+
+/// For each fault a middle, how far about it, and the size that should do there.
+pub(super) fn smaller<'a>(
+    mesh: &Mixed,
+    faults: impl IntoIterator<Item = &'a Fault>,
+    tolerance: f64,
+) -> Vec<(DVec3, f64, f64)> {
+    let place = |fault: &Fault| {
+        let side = mean_side(mesh, fault.face);
+        // Between what a round place needs, the square root, and what a pointed one does.
+        let factor = libm::pow(0.75 * tolerance / fault.distance, 0.75).clamp(0.4, 0.82);
+        (mesh.centre(fault.face), 1.2 * side, factor * side)
+    };
+    faults.into_iter().map(place).collect()
+}
+
+/// The mean length of a face's sides.
+fn mean_side(mesh: &Mixed, f: u32) -> f64 {
+    let (sum, n) = mesh.sides(f).fold((0.0, 0.0), |(sum, n), h| (sum + mesh.length(h), n + 1.0));
+    sum / n
 }

@@ -12,8 +12,10 @@
 //! feature edges; S. J. Owen, M. L. Staten, S. A. Canann, S. Saigal. Advancing front quadrilateral meshing using triangle
 //! transformations. 7th International Meshing Roundtable, 1998.
 //!
-//! Then the distance between quads and surface is certified both ways; where it is larger than `tolerance`, sizes are
-//! lowered and the front runs again.
+//! The distance between triangles and surface is certified both ways first, and sizes are lowered where it is too large.
+//! The same is done with the finished quads: where they are too far away, single vertices are moved over the ridges and
+//! tips that a face cuts off (`settle`); where that is not enough, sizes are lowered and the front runs again. The best of
+//! a few attempts is kept.
 //!
 //! # Invariants
 //! - Curves stay chains of edges between the same nodes, and nodes stay where they are; borders of regions that
@@ -31,10 +33,12 @@
 mod carry;
 mod check;
 mod midpoint;
+mod settle;
 mod sizes;
 
 use std::sync::Arc;
 
+use glam::DVec3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -44,7 +48,7 @@ use crate::step::{
     Artifact, FailureKind, InputDef, Inputs, Length, Locks, OutPort, OutputDef, Port, Produced, Sizing,
     Step as StepContract, StepFailure,
 };
-use crate::technique::clean_quads::{census, clean, finish};
+use crate::technique::clean_quads::{census, clean, finish, sharpest_sector};
 use crate::technique::front::advance;
 use crate::technique::ground::{Choice, Ground};
 use crate::technique::isotropic::{Rules, curve_distance, pair_up, polish, remesh, tighten};
@@ -52,10 +56,23 @@ use crate::technique::join::{join_along_paths, join_neighbours};
 use crate::technique::mixed::Mixed;
 use crate::watch::{Cancelled, Watch};
 
-use check::Check;
+use check::{Check, Fault, smaller};
+use settle::settle;
 
 /// How often sizes are lowered where the quads prove too far from the surface.
-const ATTEMPTS: usize = 5;
+const ATTEMPTS: usize = 3;
+/// How often sizes are lowered beforehand, where the triangles are too far from the surface.
+const PREPARATIONS: usize = 4;
+/// The part of the tolerance that triangles may use.
+const TRIANGLES: f64 = 0.7;
+/// What an attempt lacks from where faces are inverted or triangles are left.
+const BROKEN: f64 = 10.0;
+/// How much farther from their curves edges may be where that spares broken faces.
+const LOOSER: f64 = 2.0;
+/// Faces below this shape are not worth smaller ones.
+const USEFUL: f64 = 0.2;
+/// Shapes above this count as good.
+const FAIR: f64 = 0.5;
 
 /// Turns a surface into quads of a given size that follow its marked curves.
 ///
@@ -132,11 +149,15 @@ pub struct QMorphStats {
     pub clean_edits: usize,
     /// Least scaled Jacobian.
     pub min_scaled_jacobian: f64,
+    /// The sharpest angle between two curves next to each other at a node, in degrees; a corner there is no wider, so
+    /// that its sine bounds the least scaled Jacobian.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sharpest_angle: Option<f64>,
     /// Mean scaled Jacobian.
     pub mean_scaled_jacobian: f64,
     /// Share of vertices off the rims that have four edges.
     pub regular_share: f64,
-    /// How often sizes were lowered and the front run again because of the distance, and once more.
+    /// How often the front was run: once, and again where distance or shapes were not good enough.
     pub attempts: usize,
     /// The largest distance between quads and surface, certified both ways. Larger than `tolerance` where sizes must not
     /// get small enough.
@@ -234,6 +255,7 @@ fn rules(surface: &Surface, params: &QMorphParams, diagonal: f64) -> Result<(Rul
     let rules = Rules {
         tolerance: positive("tolerance", params.tolerance.resolve(diagonal))?,
         curve_tolerance: positive("curve-tolerance", params.curve_tolerance.resolve(diagonal))?,
+        shortest: 0.0,
         least_size: params.min_size.map_or(0.25 * least, |length| length.resolve(diagonal)),
         floor: params.min_size.map_or(least / 16.0, |length| length.resolve(diagonal)),
         gradation: params.gradation.clamp(0.05, 2.0),
@@ -256,42 +278,116 @@ fn morph(
     scale: f64,
     watch: &Watch,
 ) -> Result<(Mixed, QMorphStats), QMorphError> {
-    let mut stats = QMorphStats { regions: ground.region_count(), left_out: ground.left_out, ..QMorphStats::default() };
-    let mut mesh = ground.workshop().ok_or(QMorphError::NotManifold)?;
-    sizes::set(&mut mesh, ground.surface, params, scale).map_err(QMorphError::Size)?;
-    watch.phase("remeshing between the curves", None);
-    remesh(&mut mesh, ground, rules, watch)?;
+    let stats = QMorphStats { regions: ground.region_count(), left_out: ground.left_out, ..QMorphStats::default() };
     let check = Check::new(ground.surface);
-    let mut best: Option<((usize, f64), Mixed, QMorphStats)> = None;
-    for attempt in 1..=ATTEMPTS {
-        let mut quads = mesh.clone();
-        let mut now = QMorphStats { attempts: attempt, ..stats.clone() };
-        advance_and_clean(&mut quads, ground, params, rules, &mut now, watch)?;
-        let mut found = check.beyond(&quads, rules.tolerance, watch)?;
-        if found.places.is_empty() || attempt == ATTEMPTS {
-            now.clean_edits += finish(&mut quads, ground, rules.curve_tolerance, watch)?.edits;
-            found = check.beyond(&quads, rules.tolerance, watch)?;
-        }
-        let score = (found.places.len(), found.worst);
-        if best.as_ref().is_none_or(|(least, ..)| score < *least) {
-            best = Some((score, quads, now));
-        }
-        stats.attempts = attempt;
-        if found.places.is_empty() {
+    let work = Morpher { ground, params, check: &check, scale, watch };
+    let mut best = work.attempts(rules, ATTEMPTS, &stats)?;
+    // Many pieces on a curve that is rough may be what broke it: none shorter than the least size, then a looser curve.
+    let longer = Rules { shortest: rules.least_size, ..rules };
+    let looser = Rules { curve_tolerance: LOOSER * rules.curve_tolerance, ..longer };
+    for (rules, attempts) in [(longer, ATTEMPTS), (looser, 1)] {
+        if best.lack < BROKEN {
             break;
         }
-        tighten(&mut mesh, ground, rules, &found.places, watch)?;
-    }
-    if let Some((_, quads, now)) = best {
-        mesh = quads;
-        if now.attempts < stats.attempts {
-            finish(&mut mesh, ground, rules.curve_tolerance, watch)?;
+        let other = work.attempts(rules, attempts, &stats)?;
+        let attempts = best.stats.attempts + other.stats.attempts;
+        if other.lack < best.lack {
+            best = other;
         }
-        stats = QMorphStats { attempts: stats.attempts, ..now };
+        best.stats.attempts = attempts;
     }
+    let Best { mesh, mut stats, .. } = best;
     stats.distance = check.distance(&mesh, watch)?;
     stats.triangles = mesh.census().0;
     Ok((mesh, stats))
+}
+
+/// The best attempt so far.
+struct Best {
+    lack: f64,
+    mesh: Mixed,
+    stats: QMorphStats,
+}
+
+/// What all attempts share.
+struct Morpher<'a, 'g> {
+    ground: &'a Ground<'g>,
+    params: &'a QMorphParams,
+    check: &'a Check,
+    scale: f64,
+    watch: &'a Watch,
+}
+
+impl Morpher<'_, '_> {
+    /// Remeshes, and runs the front at most so many times, with smaller sizes where quads prove too far away.
+    fn attempts(&self, rules: Rules, most: usize, stats: &QMorphStats) -> Result<Best, QMorphError> {
+        let (ground, watch) = (self.ground, self.watch);
+        let mut mesh = ground.workshop().ok_or(QMorphError::NotManifold)?;
+        sizes::set(&mut mesh, ground.surface, self.params, self.scale).map_err(QMorphError::Size)?;
+        watch.phase("remeshing between the curves", None);
+        remesh(&mut mesh, ground, rules, watch)?;
+        prepare(&mut mesh, ground, self.check, rules, watch)?;
+        let mut best: Option<Best> = None;
+        for attempt in 1..=most {
+            let mut quads = mesh.clone();
+            let mut now = stats.clone();
+            advance_and_clean(&mut quads, ground, self.params, rules, &mut now, watch)?;
+            now.clean_edits += finish(&mut quads, ground, rules.curve_tolerance, watch)?.edits;
+            let faults = settle(&mut quads, ground, self.check, rules.tolerance, watch)?;
+            let lack = lack(&quads, &faults, rules.tolerance);
+            let places = wanting(&quads, &faults, rules.tolerance);
+            if best.as_ref().is_none_or(|best| lack < best.lack) {
+                best = Some(Best { lack, mesh: quads, stats: now });
+            }
+            if let Some(best) = &mut best {
+                best.stats.attempts = attempt;
+            }
+            if places.is_empty() || attempt == most {
+                break;
+            }
+            tighten(&mut mesh, ground, rules, &places, watch)?;
+        }
+        best.ok_or(QMorphError::Empty)
+    }
+}
+
+/// Lowers sizes where the triangles are too far from the surface: what they miss, quads miss more.
+fn prepare(mesh: &mut Mixed, ground: &Ground<'_>, check: &Check, rules: Rules, watch: &Watch) -> Result<(), Cancelled> {
+    let tolerance = TRIANGLES * rules.tolerance;
+    for _ in 0..PREPARATIONS {
+        let faults = check.beyond(mesh, tolerance, watch)?;
+        if faults.is_empty() {
+            break;
+        }
+        let places = smaller(mesh, &faults, tolerance);
+        tighten(mesh, ground, rules, &places, watch)?;
+    }
+    Ok(())
+}
+
+/// How much an attempt lacks: 0 where it holds to the tolerance with sound shapes.
+fn lack(mesh: &Mixed, faults: &[Fault], tolerance: f64) -> f64 {
+    let worst = faults.iter().map(|f| f.distance / tolerance - 1.0).fold(0.0, f64::max);
+    let fair = fair(mesh);
+    let (mut inverted, mut least, mut triangles) = (0.0, fair, 0.0);
+    for f in mesh.faces() {
+        let quality = mesh.quality(f);
+        inverted += f64::from(quality <= 0.0);
+        triangles += f64::from(mesh.is_triangle(f));
+        least = least.min(quality);
+    }
+    100.0 * triangles + 10.0 * inverted + 4.0 * worst + (fair - least)
+}
+
+/// The shape that each face could have: good, or as good as the sharpest corner allows.
+fn fair(mesh: &Mixed) -> f64 {
+    sharpest_sector(mesh).map_or(FAIR, |angle| FAIR.min(0.9 * libm::sin(angle)))
+}
+
+/// Where another attempt should have smaller faces: at faults of sound faces. Smaller ones would not mend the others.
+fn wanting(mesh: &Mixed, faults: &[Fault], tolerance: f64) -> Vec<(DVec3, f64, f64)> {
+    let sound = |fault: &&Fault| mesh.quality(fault.face) > USEFUL;
+    smaller(mesh, faults.iter().filter(sound), tolerance)
 }
 
 /// From triangles to clean quads.
@@ -348,6 +444,7 @@ fn judge(mesh: &Mixed, stats: &mut QMorphStats) {
     }
     stats.min_scaled_jacobian = if least.is_finite() { least } else { 0.0 };
     stats.mean_scaled_jacobian = sum / stats.quads.max(1) as f64;
+    stats.sharpest_angle = sharpest_sector(mesh).map(f64::to_degrees);
     let census = census(mesh);
     stats.regular_share = 1.0 - census.irregular as f64 / census.inner.max(1) as f64;
 }
@@ -358,7 +455,7 @@ pub struct Step;
 
 impl StepContract for Step {
     const NAME: &'static str = "q-morph";
-    const REVISION: u32 = 3;
+    const REVISION: u32 = 6;
     const INPUTS: &'static [InputDef] = &[InputDef {
         name: "from",
         accepts: &[Port::Surface],

@@ -327,7 +327,9 @@ impl Bench<'_, '_> {
             .iter()
             .map(|&v| (self.editor.mesh().point(v), self.surfaces.number(v), self.surfaces.was_moved(v)))
             .collect();
-        for &wish in wishes {
+        // What the collapsed edge or face allows no more, a place above it may: chords of a round face sink into it.
+        let above = self.editor.optimum(merge, first);
+        for wish in wishes.iter().copied().chain(above) {
             let Some(v) = self.editor.try_merge(merge, wish, rules) else { continue };
             let at = self.editor.mesh().point(v);
             let stayed = kept.iter().find(|(p, _, _)| *p == at);

@@ -1,14 +1,13 @@
 //! Faces above the aspect ratio allowed: what collapses cannot reach.
 //!
 //! A tessellation spans flat faces and fillets with needles as long as the part, and no collapse removes one that runs
-//! from curve to curve. Where neither a collapse nor a flip helps, the longest edge of the longest-edge path from the
-//! face is halved: M.-C. Rivara, New longest-edge algorithms for the refinement and/or improvement of unstructured
-//! triangulations, IJNME 40, 1997. Halving changes no geometry; the simplification then goes on to its target, and may
-//! make no face that breaks the limit.
+//! from curve to curve. Where neither a collapse nor a flip helps, it gets a new vertex ([`super::insert`]), which
+//! changes no geometry; the simplification then goes on to its target, and may make no face that breaks the limit.
 
 use glam::DVec3;
 
 use super::cases::Bench;
+use super::insert::insert;
 use crate::mesh::geometry::{angle, area_vector, triangle_area};
 use crate::mesh::halfedge::{edge_of, twin};
 use crate::mesh::{EdgeId, FaceId, Freedom, HalfedgeId, VertexId};
@@ -17,17 +16,14 @@ use crate::technique::collapse::{CollapseRules, Order, Priority};
 use crate::technique::remesh::{Gain, faces_below, raise_stretch};
 use crate::watch::{Cancelled, Watch};
 
-/// Halvings on the way from one face.
-const MOST_HALVINGS: usize = 16;
-
-/// Rounds before the strict ones begin.
-const MIXED_ROUNDS: usize = 6;
+/// Edits at one face in one round.
+const MOST_EDITS: usize = 8;
 
 /// Mending ends when it has made this many times as many faces.
 const MOST_GROWTH: usize = 2;
 
-/// Faces on a longest-edge path.
-const MOST_STEPS: usize = 64;
+/// Rounds that do not lower the number of poor faces, one after the other, before mending ends.
+const MOST_VAIN: usize = 3;
 
 /// More faces than that are no rest that a search could mend.
 const MOST_SEARCHED: usize = 200;
@@ -40,7 +36,9 @@ pub(super) fn mend(bench: &mut Bench<'_, '_>, limit: f64, watch: &Watch) -> Resu
     let rules = rules(limit);
     let mut left = faces_below(bench.editor, limit);
     let most = MOST_GROWTH * bench.editor.mesh().face_count();
-    for round in 0..MOST_ROUNDS {
+    let mut tried: Vec<u64> = Vec::new();
+    let (mut fewest, mut vain) = (left.len(), 0);
+    for _ in 0..MOST_ROUNDS {
         if left.is_empty() {
             break;
         }
@@ -50,18 +48,29 @@ pub(super) fn mend(bench: &mut Bench<'_, '_>, limit: f64, watch: &Watch) -> Resu
                 watch.check()?;
                 watch.advance(place as u64, || format!("{} faces", bench.editor.mesh().face_count()));
             }
-            mend_face(bench, f, limit, round >= MIXED_ROUNDS, &rules);
+            if !is_bad(bench, f, limit) || tried.get(f.index()) == Some(&age(bench, f)) {
+                continue;
+            }
+            mend_face(bench, f, limit, &rules);
+            if is_bad(bench, f, limit) {
+                tried.resize(tried.len().max(f.index() + 1), u64::MAX);
+                tried[f.index()] = age(bench, f);
+            }
         }
-        let rest = faces_below(bench.editor, limit);
-        if rest == left
-            || bench.editor.mesh().face_count() > most
-            || (round >= MIXED_ROUNDS && rest.len() > 2 * left.len() + 50)
-        {
+        left = faces_below(bench.editor, limit);
+        vain = if left.len() < fewest { 0 } else { vain + 1 };
+        fewest = fewest.min(left.len());
+        if vain == MOST_VAIN || bench.editor.mesh().face_count() > most {
             break;
         }
-        left = rest;
     }
     Ok(left.len())
+}
+
+/// Changes when the surroundings of a face change.
+fn age(bench: &Bench<'_, '_>, f: FaceId) -> u64 {
+    let mesh = bench.editor.mesh();
+    mesh.corners(f).into_iter().flat_map(|v| mesh.neighbours(v)).map(|v| u64::from(mesh.version(v))).sum()
 }
 
 fn rules(limit: f64) -> CollapseRules {
@@ -75,13 +84,14 @@ fn rules(limit: f64) -> CollapseRules {
 }
 
 /// Mends the few faces that are left by the search for sequences of edits; vertices that leave their fit are on none.
-pub(super) fn mend_by_search(bench: &mut Bench<'_, '_>, limit: f64, watch: &Watch) -> Result<(), Cancelled> {
+/// Returns how many are left where it was worth a search, else 0.
+pub(super) fn mend_by_search(bench: &mut Bench<'_, '_>, limit: f64, watch: &Watch) -> Result<usize, Cancelled> {
     let count = faces_below(bench.editor, limit).len();
     if count == 0 || count > MOST_SEARCHED {
-        return Ok(());
+        return Ok(0);
     }
     let rules = rules(limit);
-    raise_stretch(bench.editor, limit, &rules, watch)?;
+    let rest = raise_stretch(bench.editor, limit, &rules, watch)?;
     let mesh = bench.editor.mesh();
     let left: Vec<VertexId> = mesh
         .vertices()
@@ -90,32 +100,28 @@ pub(super) fn mend_by_search(bench: &mut Bench<'_, '_>, limit: f64, watch: &Watc
     for v in left {
         bench.surfaces.carry(v, None, true);
     }
-    Ok(())
+    Ok(rest)
 }
 
 fn is_bad(bench: &Bench<'_, '_>, f: FaceId, limit: f64) -> bool {
     bench.editor.mesh().face_is_live(f) && bench.editor.stretch(f) < limit
 }
 
-/// Collapses and flips that bring the face nearer to the limit, and halvings where there is none. A collapse or flip may
-/// undo the first halving of a needle for ever; so in `strict` rounds only collapses count that leave no face below.
-fn mend_face(bench: &mut Bench<'_, '_>, f: FaceId, limit: f64, strict: bool, rules: &CollapseRules) {
-    for _ in 0..MOST_HALVINGS {
+/// Collapses and flips that bring the face nearer to the limit, and new vertices where there is none.
+fn mend_face(bench: &mut Bench<'_, '_>, f: FaceId, limit: f64, rules: &CollapseRules) {
+    for _ in 0..MOST_EDITS {
         if !is_bad(bench, f, limit) {
             return;
         }
         let sides = sides(bench, f);
-        let merged = sides[..2].iter().find_map(|&e| {
-            if strict { merge_well(bench, e, limit, rules) } else { bench.editor.try_collapse(e, rules) }
-        });
-        if let Some(v) = merged {
+        if let Some(v) = sides[..2].iter().find_map(|&e| bench.editor.try_collapse(e, rules)) {
             bench.settle_fit(v);
             continue;
         }
-        if !strict && sides.iter().rev().any(|&e| bench.editor.try_flip(e, Gain::Mend(limit))) {
+        if sides.iter().rev().any(|&e| bench.editor.try_flip(e, Gain::Mend(limit))) {
             continue;
         }
-        if is_wedge(bench, f, limit) || !halve(bench, f) {
+        if is_wedge(bench, f, limit) || !insert(bench, f) {
             return;
         }
     }
@@ -134,17 +140,6 @@ fn is_wedge(bench: &Bench<'_, '_>, f: FaceId, limit: f64) -> bool {
     })
 }
 
-/// Collapses an edge where no face of the new star is below the limit.
-fn merge_well(bench: &mut Bench<'_, '_>, e: EdgeId, limit: f64, rules: &CollapseRules) -> Option<VertexId> {
-    let mesh = bench.editor.mesh();
-    let [a, b] = mesh.ends(e).map(|v| mesh.point(v));
-    let merge = bench.editor.plan_edge(e, rules)?;
-    [0.5 * (a + b), a, b].into_iter().find_map(|wish| {
-        let p = merge.placement.nearest(wish);
-        if bench.editor.stretch_at(p) < limit { None } else { bench.editor.try_merge(&merge, p, rules) }
-    })
-}
-
 /// The sides of a face, shortest first.
 fn sides(bench: &Bench<'_, '_>, f: FaceId) -> [EdgeId; 3] {
     let mesh = bench.editor.mesh();
@@ -157,37 +152,6 @@ fn sides(bench: &Bench<'_, '_>, f: FaceId) -> [EdgeId; 3] {
 fn length_squared(bench: &Bench<'_, '_>, h: HalfedgeId) -> f64 {
     let mesh = bench.editor.mesh();
     mesh.point(mesh.origin(h)).distance_squared(mesh.point(mesh.target(h)))
-}
-
-/// Halves the edge at the end of the longest-edge path from a face.
-fn halve(bench: &mut Bench<'_, '_>, f: FaceId) -> bool {
-    let longest = |bench: &Bench<'_, '_>, f: FaceId| {
-        let mesh = bench.editor.mesh();
-        let h = mesh.face_halfedge(f);
-        let sides = [h, mesh.next(h), mesh.prev(h)];
-        // Of equal sides the one of the lowest edge, seen alike from both faces.
-        sides.into_iter().max_by(|&a, &b| {
-            length_squared(bench, a).total_cmp(&length_squared(bench, b)).then(edge_of(b).cmp(&edge_of(a)))
-        })
-    };
-    let Some(mut h) = longest(bench, f) else { return false };
-    for _ in 0..MOST_STEPS {
-        let Some(beyond) = bench.editor.mesh().face(twin(h)) else { break };
-        let Some(next) = longest(bench, beyond) else { break };
-        if edge_of(next) == edge_of(h) {
-            break;
-        }
-        h = next;
-    }
-    let mesh = bench.editor.mesh();
-    let middle = 0.5 * (mesh.point(mesh.origin(h)) + mesh.point(mesh.target(h)));
-    let limit = bench.editor.set_min_stretch(0.0);
-    let made = bench.editor.try_split(edge_of(h), middle);
-    bench.editor.set_min_stretch(limit);
-    let Some(v) = made else { return false };
-    bench.surfaces.carry(v, None, true);
-    bench.update(v);
-    true
 }
 
 /// Flips and relaxation that raise the quality: vertices in flat areas move within their plane, vertices on a fit along

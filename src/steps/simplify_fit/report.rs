@@ -5,6 +5,9 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use crate::mesh::geometry::{aspect_ratio, centroid, stretch};
+use crate::mesh::{ResolvedFreedom, Surface};
+use crate::technique::collapse::session::{Cause, cause};
 use crate::technique::fit::Quadric;
 
 /// How it ended.
@@ -108,6 +111,8 @@ pub struct PoorFace {
     /// Its aspect ratio; absent where it has no area.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub aspect: Option<f64>,
+    /// Why it could not be mended.
+    pub cause: Cause,
 }
 
 /// What simplification with fits did.
@@ -148,6 +153,8 @@ pub struct SimplifyFitStats {
     pub share_below_20: f64,
     /// Faces above `max-aspect`.
     pub faces_above_aspect: usize,
+    /// Of these, faces that marked curves or locks allow no better.
+    pub excused_faces: usize,
     /// The worst of them, at most 64.
     pub poor_faces: Vec<PoorFace>,
     /// Edges along which flat faces run smoothly into others, kept as curves.
@@ -184,6 +191,61 @@ pub(super) fn histogram(fits: impl Iterator<Item = (FitKind, f64)>) -> Vec<Radiu
     bins.sort_by(|a, b| b.vertices.cmp(&a.vertices).then(a.kind.cmp(&b.kind)).then(a.radius.total_cmp(&b.radius)));
     bins.truncate(MOST_BINS);
     bins
+}
+
+/// The figures that are counted on the result alone.
+pub(super) fn quality(
+    result: &Surface,
+    freedom: &ResolvedFreedom,
+    max_aspect: f64,
+    least_allowed: f64,
+) -> SimplifyFitStats {
+    let (mut least, mut sum, mut below_20) = (1.0_f64, 0.0, 0_usize);
+    let mut poor = Vec::new();
+    for f in result.faces.ids() {
+        let corners = result.corners(f);
+        let (shape, aspect) = (stretch(corners), aspect_ratio(corners));
+        least = least.min(shape);
+        sum += shape;
+        below_20 += usize::from(aspect < 20.0);
+        if aspect.is_nan() || aspect > max_aspect {
+            let aspect = aspect.is_finite().then_some(aspect);
+            let cause = cause(result, freedom, f, least_allowed);
+            poor.push(PoorFace { face: f.raw(), at: centroid(corners).to_array(), aspect, cause });
+        }
+    }
+    let count = result.faces.len();
+    poor.sort_by(|a, b| {
+        let key = |p: &PoorFace| p.aspect.unwrap_or(f64::INFINITY);
+        key(b).total_cmp(&key(a)).then(a.face.cmp(&b.face))
+    });
+    let faces_above_aspect = poor.len();
+    let excused_faces = poor.iter().filter(|p| p.cause != Cause::Stuck).count();
+    poor.truncate(64);
+    SimplifyFitStats {
+        status: Status::Stuck,
+        faces_before: count,
+        faces_after: count,
+        target_faces: count,
+        removed: 0.0,
+        operations: Operations::default(),
+        spheres: Trials::default(),
+        cylinders: Trials::default(),
+        vertices_on_fits: 0,
+        radii: Vec::new(),
+        largest_projection: 0.0,
+        refused_by_tolerance: 0,
+        refused_by_intersection: 0,
+        min_stretch: least,
+        mean_stretch: sum / count.max(1) as f64,
+        share_below_20: below_20 as f64 / count.max(1) as f64,
+        faces_above_aspect,
+        excused_faces,
+        poor_faces: poor,
+        smooth_edges: 0,
+        tolerance: 0.0,
+        distance_bound: None,
+    }
 }
 
 #[cfg(test)]

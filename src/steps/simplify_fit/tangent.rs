@@ -3,7 +3,8 @@
 //! No dihedral angle finds them: the bend there is half of the one between two facets of the fillet. But a flat face of the
 //! part is much larger than a facet beside it. So coplanar regions are grown, and one that is at least twice as large
 //! as all its smooth neighbours is a flat face, whose smooth edges are curves for the time of the simplification: flat
-//! faces stay exactly flat, and vertices on fillets do not leave them.
+//! faces stay exactly flat, and vertices on fillets do not leave them. Strips hardly wider than the tolerance are no flat
+//! faces: between two curves so near nothing could be done but cutting them into ever smaller triangles.
 //! Cost: O(F log F).
 
 use crate::mesh::geometry::{Aabb, angle, area_vector};
@@ -21,12 +22,15 @@ const LEAST_BEND: f64 = 0.017_5;
 /// How many times larger than each of its smooth neighbours a flat face is.
 const LARGER: f64 = 2.0;
 
+/// Tolerances that a flat face is wide: twice its area by its perimeter.
+const WIDE: f64 = 2.0;
+
 /// The edge group that tells smooth lines from marks; no file can bring this name.
 const GROUP: &str = "\u{1}smooth-lines";
 
 /// The surface with its smooth lines as marked curves, and their number.
-pub(super) fn with_smooth_lines(surface: &Surface) -> (Surface, usize) {
-    let lines = smooth_lines(surface);
+pub(super) fn with_smooth_lines(surface: &Surface, tolerance: f64) -> (Surface, usize) {
+    let lines = smooth_lines(surface, WIDE * tolerance);
     let mut marked = surface.clone();
     for &line in &lines {
         marked.carried.mark(line, EdgeMark { freedom: Freedom::OnCurve, cause: MarkCause::Feature });
@@ -53,7 +57,7 @@ struct Regions {
     normal: Vec<glam::DVec3>,
 }
 
-fn smooth_lines(surface: &Surface) -> Vec<EdgeKey> {
+fn smooth_lines(surface: &Surface, wide: f64) -> Vec<EdgeKey> {
     let pairs = inner_edges(surface);
     let regions = grow(surface, &pairs);
     let mut largest_beside = vec![0.0_f64; regions.area.len()];
@@ -65,10 +69,30 @@ fn smooth_lines(surface: &Surface) -> Vec<EdgeKey> {
         largest_beside[r] = largest_beside[r].max(regions.area[s]);
         largest_beside[s] = largest_beside[s].max(regions.area[r]);
     }
-    let is_flat =
-        |r: usize| regions.faces[r] >= 2 && largest_beside[r] > 0.0 && regions.area[r] >= LARGER * largest_beside[r];
+    let perimeter = perimeters(surface, &regions, &pairs);
+    // Areas are those of parallelograms, twice those of the faces.
+    let is_flat = |r: usize| {
+        let is_large = regions.area[r] >= LARGER * largest_beside[r] && largest_beside[r] > 0.0;
+        regions.faces[r] >= 2 && is_large && regions.area[r] >= wide * perimeter[r]
+    };
     let lines = pairs.iter().filter(|&&(_, sides)| bends(sides).is_some_and(|[r, s]| is_flat(r) || is_flat(s)));
     lines.map(|&(key, _)| key).collect()
+}
+
+/// The length of the border of each region.
+fn perimeters(surface: &Surface, regions: &Regions, pairs: &[(EdgeKey, [FaceId; 2])]) -> Vec<f64> {
+    let mut perimeter = vec![0.0; regions.area.len()];
+    for f in surface.faces.ids() {
+        let [a, b, c] = surface.corners(f);
+        perimeter[regions.of_face[f.index()] as usize] += a.distance(b) + b.distance(c) + c.distance(a);
+    }
+    for ([a, b], [f, g]) in pairs {
+        let [r, s] = [f, g].map(|f| regions.of_face[f.index()] as usize);
+        if r == s {
+            perimeter[r] -= 2.0 * surface.points[*a].distance(surface.points[*b]);
+        }
+    }
+    perimeter
 }
 
 /// Inner edges without a mark, in order, each with its two faces.

@@ -2,7 +2,7 @@
 
 use smallvec::{SmallVec, smallvec};
 
-use super::{Cleaner, GOOD};
+use super::{Cleaner, GOOD, valence};
 use crate::technique::mixed::{Corners, NONE, Place};
 
 /// Faces to take away, faces to put there, a vertex that another one replaces.
@@ -39,7 +39,22 @@ impl Cleaner<'_, '_> {
             }
         }
         kinds.sort_by(|x, y| y.0.total_cmp(&x.0).then(x.1.cmp(&y.1)));
-        kinds.into_iter().take(if self.is_rescue { 24 } else { 8 }).any(|(_, _, kind)| self.attempt(kind))
+        if !self.is_rescue {
+            return kinds.into_iter().take(8).any(|(_, _, kind)| self.attempt(kind, true).is_some());
+        }
+        // The one that leaves the best shapes.
+        let mut best: Option<(f64, Kind)> = None;
+        for (_, _, kind) in kinds.into_iter().take(24) {
+            if let Some(quality) = self.attempt(kind, false)
+                && best.is_none_or(|(most, _)| quality > most)
+            {
+                best = Some((quality, kind));
+                if quality > super::POOR {
+                    break;
+                }
+            }
+        }
+        best.is_some_and(|(_, kind)| self.attempt(kind, true).is_some())
     }
 
     fn kinds(&self, v: u32) -> Vec<Kind> {
@@ -178,24 +193,8 @@ impl Cleaner<'_, '_> {
     fn bound_change(&self, v: u32, by: f64) -> f64 {
         // Sectors are few and the edit touches one: judging the whole star by its inner sector is exact on plain curve
         // vertices seen from one side only, and errs on the safe side else, because the edit is measured again.
-        let star: SmallVec<[u32; 16]> = self.mesh.star(v).collect();
-        let mut best = f64::NEG_INFINITY;
-        let bound = |h: u32| self.mesh.arc(h) != NONE || self.mesh.face(h) == NONE || self.mesh.face(h ^ 1) == NONE;
-        let Some(start) = star.iter().position(|&h| bound(h)) else { return 0.0 };
-        let (mut quads, mut angle) = (0.0, 0.0);
-        for i in 0..=star.len() {
-            let h = star[(start + i) % star.len()];
-            if i > 0 && bound(h) {
-                if quads > 0.0 {
-                    best = best.max(super::valence::cost(quads, angle) - super::valence::cost(quads + by, angle));
-                }
-                (quads, angle) = (0.0, 0.0);
-            }
-            if i < star.len() && self.mesh.face(h) != NONE {
-                quads += 1.0;
-                angle += self.mesh.corner_angle(h);
-            }
-        }
+        let gain = |(quads, angle): (f64, f64)| valence::cost(quads, angle) - valence::cost(quads + by, angle);
+        let best = valence::sectors(self.mesh, v).into_iter().map(gain).fold(f64::NEG_INFINITY, f64::max);
         if best.is_finite() { best } else { 0.0 }
     }
 
@@ -247,7 +246,7 @@ impl Cleaner<'_, '_> {
         let region = m.region(m.face(h));
         let point = 0.5 * (m.point(a) + m.point(b));
         let size = m.size(a);
-        let foot = self.ground.project(region, point);
+        let foot = self.ground.project_from(region, point, m.point(a));
         let x = self.mesh.add_vertex(foot.point, foot.normal, Place::Region(region), size);
         let new = if left {
             smallvec![smallvec![a, e, f, x], smallvec![f, b, c, x], smallvec![c, d, a, x]]
@@ -262,7 +261,8 @@ impl Cleaner<'_, '_> {
         let (region, centre) = (self.mesh.region(f), self.mesh.centre(f));
         let mut inner = Corners::new();
         for &v in &outer {
-            let foot = self.ground.project(region, self.mesh.point(v).lerp(centre, 0.5));
+            let at = self.mesh.point(v);
+            let foot = self.ground.project_from(region, at.lerp(centre, 0.5), at);
             let size = self.mesh.size(v);
             inner.push(self.mesh.add_vertex(foot.point, foot.normal, Place::Region(region), size));
         }
@@ -284,7 +284,7 @@ impl Cleaner<'_, '_> {
             middle += self.mesh.centre(f);
         }
         let point = self.mesh.point(v).lerp(middle / between as f64, 0.4);
-        let foot = self.ground.project(region, point);
+        let foot = self.ground.project_from(region, point, self.mesh.point(v));
         let size = self.mesh.size(v);
         let w = self.mesh.add_vertex(foot.point, foot.normal, Place::Region(region), size);
         let mut edit = Edit { old: SmallVec::new(), new: SmallVec::new(), moved: None };
@@ -298,18 +298,18 @@ impl Cleaner<'_, '_> {
         Some(edit)
     }
 
-    /// Does an edit, smooths, and keeps it if it gained.
-    fn attempt(&mut self, kind: Kind) -> bool {
+    /// Does an edit, smooths, and keeps it if it gained and is to be kept. The least quality it came to if it gained.
+    fn attempt(&mut self, kind: Kind, keep: bool) -> Option<f64> {
         self.mesh.begin();
         let Some(edit) = self.edit(kind) else {
             self.mesh.rollback();
-            return false;
+            return None;
         };
         let ring = self.corners_of(&edit.old);
         let before = self.judge(&ring);
         if self.mesh.replace(&edit.old, &edit.new, edit.moved).is_none() {
             self.mesh.rollback();
-            return false;
+            return None;
         }
         let mut touched: Vec<u32> = ring.iter().copied().filter(|&v| self.mesh.is_vertex(v)).collect();
         touched.extend(edit.new.iter().flatten().copied());
@@ -317,7 +317,7 @@ impl Cleaner<'_, '_> {
         touched.dedup();
         if !touched.iter().all(|&v| self.mesh.is_proper(v, 3)) {
             self.mesh.rollback();
-            return false;
+            return None;
         }
         if let Some((_, kept)) = edit.moved {
             self.centre_between(kept);
@@ -333,13 +333,13 @@ impl Cleaner<'_, '_> {
         // A face that is no use at all is worth any valence, a poor one a few.
         let price = if before.1 < 0.2 { 12.0 } else { 4.0 };
         let rescued = self.is_rescue && after.1 > before.1 + 0.05 && after.0 < before.0 + price;
-        if (!self.is_rescue && ((fewer && good) || better)) || rescued {
+        let gained = (!self.is_rescue && ((fewer && good) || better)) || rescued;
+        if gained && keep {
             self.mesh.commit();
-            true
         } else {
             self.mesh.rollback();
-            false
         }
+        gained.then_some(after.1)
     }
 
     /// The sum of misfits and the least quality at these vertices.

@@ -22,19 +22,23 @@ mod edits;
 mod relax;
 mod valence;
 
+use rustc_hash::FxHashSet;
+
 use super::ground::Ground;
 use super::mixed::{Mixed, Place};
 use crate::watch::{Cancelled, Watch};
 
-pub use valence::{Census, census};
+pub use valence::{Census, census, sharpest_sector};
 
 /// A cleaned neighbourhood must be at least this good, or better than before.
 const GOOD: f64 = 0.35;
 
 /// Faces below this are worth edits that make valences worse.
 const POOR: f64 = 0.5;
+/// Faces below this are tried again and again.
+const USELESS: f64 = 0.15;
 /// Rounds of such edits.
-const RESCUES: usize = 3;
+const RESCUES: usize = 5;
 
 /// What was done.
 #[derive(Clone, Copy, Debug, Default)]
@@ -55,7 +59,7 @@ struct Cleaner<'a, 'g> {
     is_rescue: bool,
 }
 
-/// Cleans the topology, then optimises the shapes a little; [`finish`] goes on. Vertices slide along curves within
+/// Cleans the topology and smooths; [`finish`] goes on. Vertices slide along curves within
 /// `curve_tolerance` of them.
 pub fn clean(
     mesh: &mut Mixed,
@@ -78,7 +82,6 @@ pub fn clean(
     cleaner.mesh.compact();
     let mut cleaner = Cleaner { mesh, ground, curve_tolerance, is_rescue: false };
     cleaner.relax_all(6);
-    report.rounds = cleaner.optimise(3, watch)?;
     Ok(report)
 }
 
@@ -92,8 +95,9 @@ pub fn finish(
     let mut cleaner = Cleaner { mesh, ground, curve_tolerance, is_rescue: false };
     let mut report = CleanReport { edits: 0, rounds: cleaner.optimise(12, watch)? };
     cleaner.is_rescue = true;
+    let mut tried = FxHashSet::default();
     for _ in 0..RESCUES {
-        let rescued = cleaner.rescue();
+        let rescued = cleaner.rescue(&mut tried);
         if rescued == 0 {
             break;
         }
@@ -129,14 +133,19 @@ impl Cleaner<'_, '_> {
         edits
     }
 
-    /// Edits at the corners of poor faces, the worst first. Returns the number of edits.
-    fn rescue(&mut self) -> usize {
+    /// Edits at the corners of poor faces, the worst first; faces that were tried in vain are left alone. Returns the
+    /// number of edits.
+    fn rescue(&mut self, tried: &mut FxHashSet<u32>) -> usize {
         let quality = |f: u32| (self.mesh.quality(f), f);
         let mut poor: Vec<(f64, u32)> = self.mesh.faces().map(quality).filter(|&(q, _)| q < POOR).collect();
         poor.sort_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
         let mut edits = 0;
         for (_, f) in poor {
             if !self.mesh.is_face(f) || self.mesh.is_triangle(f) || self.mesh.quality(f) >= POOR {
+                continue;
+            }
+            // What is of no use is always worth another look: its neighbours may be others by now.
+            if !tried.insert(f) && self.mesh.quality(f) > USELESS {
                 continue;
             }
             for v in self.mesh.corners(f) {

@@ -7,6 +7,9 @@ use super::Cleaner;
 use crate::technique::mixed::{Place, quad_quality, triangle_quality};
 use crate::watch::{Cancelled, Watch};
 
+/// Vertices whose faces cost less each are not worth a search.
+const FINE: f64 = 5e-4;
+
 /// The other corners of the faces at a vertex, and which corner the vertex is: what a move changes.
 struct Star {
     faces: SmallVec<[([DVec3; 4], u8, u8); 8]>,
@@ -85,7 +88,7 @@ impl Cleaner<'_, '_> {
                 sum += self.mesh.point(w);
                 n += 1.0;
             }
-            let foot = self.ground.project(region, sum / n);
+            let foot = self.ground.project_from(region, sum / n, self.mesh.point(v));
             if self.is_near(v, foot.normal) {
                 self.mesh.set_point(v, foot.point, foot.normal);
             }
@@ -105,7 +108,7 @@ impl Cleaner<'_, '_> {
                     }
                     let now = self.mesh.point(v);
                     let star = self.star(v, self.mesh.normal(v));
-                    let foot = self.ground.project(region, sum / weight);
+                    let foot = self.ground.project_from(region, sum / weight, now);
                     if self.is_near(v, foot.normal) && star.cost(foot.point) < star.cost(now) {
                         self.mesh.set_point(v, foot.point, foot.normal);
                     }
@@ -182,6 +185,9 @@ impl Cleaner<'_, '_> {
         let star = self.star(v, normal);
         let start = self.mesh.point(v);
         let first = star.cost(start);
+        if first < FINE * star.faces.len() as f64 {
+            return false;
+        }
         let axis = if normal == DVec3::ZERO { DVec3::Z } else { normal };
         let x = axis.any_orthonormal_vector();
         let y = axis.cross(x);
@@ -204,7 +210,7 @@ impl Cleaner<'_, '_> {
         if first - cost < 1e-4 * first.max(1e-3) {
             return false;
         }
-        let foot = self.ground.project(region, best);
+        let foot = self.ground.project_from(region, best, start);
         let sound = star.cost(foot.point) < first && self.is_near(v, foot.normal);
         if sound {
             self.mesh.set_point(v, foot.point, foot.normal);

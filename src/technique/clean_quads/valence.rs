@@ -1,7 +1,9 @@
 //! How far valences are from their ideals.
 
+use smallvec::SmallVec;
+
 use super::Cleaner;
-use crate::technique::mixed::{Mixed, NONE};
+use crate::technique::mixed::{Mixed, NONE, Place};
 
 /// Irregular vertices of a mesh.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -24,6 +26,35 @@ pub fn census(mesh: &Mixed) -> Census {
     census
 }
 
+/// The least angle between two curves next to each other at a node, in radians: no corner there can be wider.
+pub fn sharpest_sector(mesh: &Mixed) -> Option<f64> {
+    let nodes = mesh.vertices().filter(|&v| mesh.place(v) == Place::Node);
+    nodes.flat_map(|v| sectors(mesh, v)).map(|(_, angle)| angle).min_by(f64::total_cmp)
+}
+
+/// The sectors between the curves and rims at a vertex, each with its quads and its angle; none where there is no curve.
+pub(super) fn sectors(mesh: &Mixed, v: u32) -> SmallVec<[(f64, f64); 8]> {
+    let mut found = SmallVec::new();
+    let star: SmallVec<[u32; 16]> = mesh.star(v).collect();
+    let bound = |h: u32| mesh.arc(h) != NONE || mesh.face(h) == NONE || mesh.face(h ^ 1) == NONE;
+    let Some(start) = star.iter().position(|&h| bound(h)) else { return found };
+    let (mut quads, mut angle) = (0.0, 0.0);
+    for i in 0..=star.len() {
+        let h = star[(start + i) % star.len()];
+        if i > 0 && bound(h) {
+            if quads > 0.0 {
+                found.push((quads, angle));
+            }
+            (quads, angle) = (0.0, 0.0);
+        }
+        if i < star.len() && mesh.face(h) != NONE {
+            quads += 1.0;
+            angle += mesh.corner_angle(h);
+        }
+    }
+    found
+}
+
 /// The quads that fit into an angle, in radians.
 pub(super) fn ideal(angle: f64) -> f64 {
     (angle / std::f64::consts::FRAC_PI_2).round().max(1.0)
@@ -44,30 +75,11 @@ impl Cleaner<'_, '_> {
             let difference = self.mesh.valence(v) as f64 - 4.0;
             return difference * difference;
         }
-        // Sectors between curves, each with its quads and its angle; a sector starts after a curve or the border.
-        let star: smallvec::SmallVec<[u32; 16]> = self.mesh.star(v).collect();
-        let bound = |h: u32| self.mesh.arc(h) != NONE || self.mesh.face(h) == NONE || self.mesh.face(h ^ 1) == NONE;
-        let Some(start) = star.iter().position(|&h| bound(h)) else {
-            let difference = star.len() as f64 - 4.0;
+        let sectors = sectors(self.mesh, v);
+        if sectors.is_empty() {
+            let difference = self.mesh.valence(v) as f64 - 4.0;
             return difference * difference;
-        };
-        let (mut sum, mut quads, mut angle) = (0.0, 0.0, 0.0);
-        for i in 0..star.len() {
-            let h = star[(start + i) % star.len()];
-            if i > 0 && bound(h) {
-                if quads > 0.0 {
-                    sum += cost(quads, angle);
-                }
-                (quads, angle) = (0.0, 0.0);
-            }
-            if self.mesh.face(h) != NONE {
-                quads += 1.0;
-                angle += self.mesh.corner_angle(h);
-            }
         }
-        if quads > 0.0 {
-            sum += cost(quads, angle);
-        }
-        sum
+        sectors.into_iter().map(|(quads, angle)| cost(quads, angle)).sum()
     }
 }

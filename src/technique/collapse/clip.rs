@@ -19,13 +19,20 @@ pub(super) fn ball(corners: &[DVec3]) -> (DVec3, f64) {
     (centre, squared.sqrt())
 }
 
-/// The two parts of a convex piece on the lower and on the upper side of a plane; either may be empty.
-fn cut(piece: &[DVec3], foot: DVec3, normal: DVec3) -> [Convex; 2] {
+/// The two parts of a convex piece on the lower and on the upper side of a plane; either may be empty. Corners within
+/// `near` of the plane are on it: else rounding would have the same sliver cut off for ever.
+fn cut(piece: &[DVec3], foot: DVec3, normal: DVec3, near: f64) -> [Convex; 2] {
     let mut parts = [Convex::new(), Convex::new()];
-    let mut previous = piece[piece.len() - 1];
-    let mut before = normal.dot(previous - foot);
-    for &p in piece {
+    let near = near * normal.length();
+    let height_of = |p: DVec3| {
         let height = normal.dot(p - foot);
+        if height.abs() <= near { 0.0 } else { height }
+    };
+    let mut previous = piece[piece.len() - 1];
+    let mut before = height_of(previous);
+    let (mut is_below, mut is_above) = (false, false);
+    for &p in piece {
+        let height = height_of(p);
         if before < 0.0 && height > 0.0 || before > 0.0 && height < 0.0 {
             let crossing = previous + (p - previous) * (before / (before - height));
             parts[0].push(crossing);
@@ -37,20 +44,28 @@ fn cut(piece: &[DVec3], foot: DVec3, normal: DVec3) -> [Convex; 2] {
         if height >= 0.0 {
             parts[1].push(p);
         }
+        is_below |= height < 0.0;
+        is_above |= height > 0.0;
         (previous, before) = (p, height);
     }
     // A side or a corner that touches the plane is no part of the other side.
-    for part in &mut parts {
-        if part.len() < 3 {
-            part.clear();
-        }
+    if !is_above {
+        parts[1].clear();
+    } else if !is_below {
+        parts[0].clear();
     }
     parts
 }
 
 /// Cuts `piece` along the sides of a triangle: what lies over it comes back, the rest goes to `rest`. `None` where the
 /// piece lies wholly beyond one side, or has too many corners; then nothing is cut.
-pub(super) fn cut_out(piece: &[DVec3], over: [DVec3; 3], normal: DVec3, rest: &mut Vec<Convex>) -> Option<Convex> {
+pub(super) fn cut_out(
+    piece: &[DVec3],
+    over: [DVec3; 3],
+    normal: DVec3,
+    near: f64,
+    rest: &mut Vec<Convex>,
+) -> Option<Convex> {
     if piece.len() > MOST_CORNERS {
         return None;
     }
@@ -58,7 +73,7 @@ pub(super) fn cut_out(piece: &[DVec3], over: [DVec3; 3], normal: DVec3, rest: &m
     let mut inside = Convex::from_slice(piece);
     for at in 0..3 {
         let (p, q) = (over[at], over[(at + 1) % 3]);
-        let [inner, outer] = cut(&inside, p, (q - p).cross(normal));
+        let [inner, outer] = cut(&inside, p, (q - p).cross(normal), near);
         if inner.is_empty() {
             rest.truncate(kept);
             return None;
@@ -69,6 +84,24 @@ pub(super) fn cut_out(piece: &[DVec3], over: [DVec3; 3], normal: DVec3, rest: &m
         inside = inner;
     }
     Some(inside)
+}
+
+/// Cuts `piece` across a line through `p` and `q` at both points: what lies between them comes back, the rest goes to
+/// `rest`. `None` where nothing does; then nothing is cut.
+pub(super) fn cut_between(piece: &[DVec3], p: DVec3, q: DVec3, near: f64, rest: &mut Vec<Convex>) -> Option<Convex> {
+    if piece.len() > MOST_CORNERS {
+        return None;
+    }
+    let [inner, before] = cut(piece, p, p - q, near);
+    if inner.is_empty() {
+        return None;
+    }
+    let [inner, after] = cut(&inner, q, q - p, near);
+    if inner.is_empty() {
+        return None;
+    }
+    rest.extend([before, after].into_iter().filter(|part| !part.is_empty()));
+    Some(inner)
 }
 
 /// Two halves, cut through the middle of the piece across its longest extent, and that extent.
@@ -83,7 +116,7 @@ pub(super) fn halve(piece: &[DVec3]) -> (f64, [Convex; 2]) {
         }
     }
     let (centre, _) = ball(piece);
-    (longest.0.sqrt(), cut(piece, centre, longest.1))
+    (longest.0.sqrt(), cut(piece, centre, longest.1, 0.0))
 }
 
 #[cfg(test)]
@@ -107,7 +140,7 @@ mod tests {
             prop_assume!(normal.length() > 0.01);
             let mut parts = Vec::new();
             let whole = area(&piece);
-            if let Some(inside) = cut_out(&piece, over, normal, &mut parts) {
+            if let Some(inside) = cut_out(&piece, over, normal, 0.0, &mut parts) {
                 for at in 0..3 {
                     let outward = (over[(at + 1) % 3] - over[at]).cross(normal);
                     prop_assert!(inside.iter().all(|&p| outward.dot(p - over[at]) <= 1e-9));

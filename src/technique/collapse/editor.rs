@@ -7,6 +7,7 @@
 use glam::DVec3;
 
 use super::collision::Collision;
+use super::envelope::Envelope;
 use super::keeper::Keeper;
 use super::limits::{Limits, least_stretch};
 use super::placement::{Order, Site};
@@ -73,6 +74,8 @@ pub(in crate::technique) struct Patch {
     /// Successors: their number where they have one already.
     pub(in crate::technique) ids: Vec<FaceId>,
     pub(in crate::technique) points: Vec<[DVec3; 3]>,
+    /// Whether the surface stays the same set of points, up to rounding.
+    pub(in crate::technique) is_same: bool,
     beside: Vec<FaceId>,
     beside_points: Vec<[DVec3; 3]>,
 }
@@ -82,6 +85,7 @@ impl Patch {
         self.old.clear();
         self.ids.clear();
         self.points.clear();
+        self.is_same = false;
     }
 }
 
@@ -357,12 +361,13 @@ impl<'a> Editor<'a> {
             }
             patch.beside_points.clear();
             patch.beside_points.extend(patch.beside.iter().map(|&f| self.mesh.corner_points(f)));
-            if !envelope.admits(&patch.old, &patch.points, &patch.beside_points) {
+            let admits = if patch.is_same { Envelope::admits_same } else { Envelope::admits };
+            if !admits(envelope, &patch.old, &patch.points, &patch.beside_points) {
                 self.counts.beyond_tolerance += 1;
                 return false;
             }
         }
-        if self.collision.hits(&self.mesh, &patch.old, &patch.points) {
+        if !patch.is_same && self.collision.hits(&self.mesh, &patch.old, &patch.points) {
             self.counts.collisions += 1;
             return false;
         }

@@ -125,6 +125,17 @@ impl Editor<'_> {
         (improves && even && !self.folds()).then_some(after)
     }
 
+    /// The point of least squared distance to the planes and lines of all that was merged, nearest to `near`; `None` where
+    /// freedom fixes the place, the planes leave it far away, or it is that point itself.
+    pub fn optimum(&self, merge: &Merge, near: DVec3) -> Option<DVec3> {
+        let site = &merge.site;
+        let x = site.planes.plus(&site.lines).optimum(near - site.origin) + site.origin;
+        let [p, q] = site.ends;
+        // In flat places it is the same point up to rounding, which would only take it off its plane.
+        let moved = (x - near).length_squared() / (q - p).length_squared();
+        (merge.placement == Placement::Anywhere && (1e-12..=4.0).contains(&moved)).then_some(x)
+    }
+
     /// The edges round the star of the last plan, opposite to the merged vertex.
     pub fn rim(&self) -> impl Iterator<Item = [DVec3; 2]> + Clone + '_ {
         self.patch.points.iter().map(|points| [points[1], points[2]])

@@ -20,6 +20,7 @@ mod boxes;
 mod clip;
 pub mod collision;
 mod corners;
+mod cover;
 pub mod editor;
 pub mod envelope;
 pub mod keeper;
@@ -31,6 +32,7 @@ pub mod quadrics;
 mod queue;
 pub mod session;
 mod star;
+mod target;
 
 use queue::Queue;
 

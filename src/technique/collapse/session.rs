@@ -226,7 +226,8 @@ pub fn best_stretch_at(apex: f64) -> f64 {
     12.0_f64.sqrt() * 0.5 * libm::sin(apex) / (1.0 + libm::sin(0.5 * apex))
 }
 
-fn cause(surface: &Surface, freedom: &ResolvedFreedom, f: FaceId, threshold: f64) -> Cause {
+/// Why a face is below a stretch.
+pub fn cause(surface: &Surface, freedom: &ResolvedFreedom, f: FaceId, threshold: f64) -> Cause {
     let corners = surface.faces[f];
     for at in 0..3 {
         let (v, a, b) = (corners[at], corners[(at + 1) % 3], corners[(at + 2) % 3]);

@@ -190,7 +190,7 @@ impl Front<'_, '_> {
         let (a, b) = (self.mesh.origin(edge), self.mesh.target(edge));
         let region = self.mesh.region(self.mesh.face(edge));
         let point = self.mesh.point(a).lerp(self.mesh.point(b), t);
-        let foot = self.ground.project(region, point);
+        let foot = self.ground.project_from(region, point, self.mesh.point(a));
         let size = self.mesh.size(a) + t * (self.mesh.size(b) - self.mesh.size(a));
         let (f, g) = (self.mesh.face(edge), self.mesh.face(edge ^ 1));
         let (c, d) = (self.mesh.origin(self.mesh.prev(edge)), self.mesh.origin(self.mesh.prev(edge ^ 1)));
@@ -215,7 +215,7 @@ impl Front<'_, '_> {
         let ideal = origin + length * (libm::cos(angle) * u + libm::sin(angle) * side);
         let now = self.mesh.point(top);
         for share in [1.0, 0.5, 0.25] {
-            let foot = self.ground.project(region, now.lerp(ideal, share));
+            let foot = self.ground.project_from(region, now.lerp(ideal, share), now);
             if self.may_move(top, foot.point, foot.normal) {
                 self.mesh.set_point(top, foot.point, foot.normal);
                 return;

@@ -20,7 +20,7 @@ impl Front<'_, '_> {
             let wish = self.wish(v);
             let now = self.mesh.point(v);
             for share in [1.0, 0.4] {
-                let foot = self.ground.project(region, now.lerp(wish, share));
+                let foot = self.ground.project_from(region, now.lerp(wish, share), now);
                 if self.may_move(v, foot.point, foot.normal) {
                     self.mesh.set_point(v, foot.point, foot.normal);
                     break;

@@ -62,14 +62,23 @@ impl Curve {
 
     /// The largest distance between the piece from `from` to `to` and its chord.
     pub fn sag(&self, from: f64, to: f64) -> f64 {
+        self.bend(from, to).0
+    }
+
+    /// The largest distance between the piece from `from` to `to` and its chord, the length from the start where it is
+    /// reached, and the number of points inside the piece.
+    pub(super) fn bend(&self, from: f64, to: f64) -> (f64, f64, usize) {
         let chord = [self.at(from), self.at(to)];
         let first = self.along.partition_point(|&s| s <= from);
         let end = self.along.partition_point(|&s| s < to);
-        let mut sag: f64 = 0.0;
-        for p in self.points.get(first..end).unwrap_or_default() {
-            sag = sag.max(crate::mesh::geometry::closest_on_segment(*p, chord).distance_squared);
+        let mut most = (0.0, from);
+        for i in first..end {
+            let off = crate::mesh::geometry::closest_on_segment(self.points[i], chord).distance_squared;
+            if off > most.0 {
+                most = (off, self.along[i]);
+            }
         }
-        sag.sqrt()
+        (most.0.sqrt(), most.1, end.saturating_sub(first))
     }
 }
 

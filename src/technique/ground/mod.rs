@@ -23,7 +23,7 @@ pub(crate) use sample::respread;
 pub use sample::sample;
 
 use super::mixed::{Mixed, NONE, Place};
-use crate::mesh::bvh::TriangleBvh;
+use crate::mesh::bvh::{Closest, TriangleBvh};
 use crate::mesh::geometry::triangle_normal;
 use crate::mesh::topology::EdgeTable;
 use crate::mesh::{FaceId, Freedom, Surface, VertexId};
@@ -117,7 +117,21 @@ impl<'a> Ground<'a> {
     /// The point of a region nearest to `p`.
     pub fn project(&self, region: u32, p: DVec3) -> Foot {
         let sheet = &self.sheets[region as usize];
-        match sheet.tree.closest(p) {
+        self.foot(sheet, p, sheet.tree.closest(p))
+    }
+
+    /// The same, quicker where `from` is a point of the region not far away: nothing farther than it is looked at.
+    pub fn project_from(&self, region: u32, p: DVec3, from: DVec3) -> Foot {
+        let sheet = &self.sheets[region as usize];
+        let bound = p.distance_squared(from) * (1.0 + 1e-6);
+        match sheet.tree.closest_within(p, bound) {
+            None => self.project(region, p),
+            found => self.foot(sheet, p, found),
+        }
+    }
+
+    fn foot(&self, sheet: &Sheet, p: DVec3, found: Option<Closest>) -> Foot {
+        match found {
             Some(closest) => {
                 let face = sheet.faces[closest.index as usize];
                 Foot {

@@ -18,7 +18,11 @@ impl Remesher<'_, '_> {
             let ends = [self.mesh.origin(h), self.mesh.target(h)];
             let length = self.mesh.length(h);
             let middle = 0.5 * (self.mesh.point(ends[0]) + self.mesh.point(ends[1]));
-            let off = self.ground.project(self.mesh.region(self.mesh.face(h)), middle).distance_squared.sqrt();
+            let off = self
+                .ground
+                .project_from(self.mesh.region(self.mesh.face(h)), middle, self.mesh.point(ends[0]))
+                .distance_squared
+                .sqrt();
             if off > tolerance {
                 let factor = (tolerance / off).sqrt().max(0.5);
                 wishes.extend(ends.map(|v| (v, factor * length.min(self.mesh.size(v)))));

@@ -70,7 +70,7 @@ impl Remesher<'_, '_> {
         let curve = &self.ground.curves[arc];
         let sizes: Vec<(f64, f64)> = chain.iter().map(|&(at, v)| (at, self.mesh.size(v))).collect();
         let least = if curve.is_closed() { 4 } else { least };
-        sample(curve, &sizes, self.rules.curve_tolerance, least)
+        sample(curve, &sizes, self.rules.curve_tolerance, least, self.rules.shortest)
     }
 
     /// The curves of one piece round regions of so few pieces that quads would have flat corners there.
@@ -100,7 +100,8 @@ impl Remesher<'_, '_> {
                 .into_iter()
                 .filter(|&i| i < inside.len() && !taken[i] && (inside[i].0 - places[k]).abs() <= reach)
                 .min_by(|&i, &j| (inside[i].0 - places[k]).abs().total_cmp(&(inside[j].0 - places[k]).abs()));
-            let size = 0.5 * (places[k + 1] - places[k - 1]);
+            // The longer one of both pieces: where a bend makes one short, the other must not follow it.
+            let size = (places[k + 1] - places[k]).max(places[k] - places[k - 1]);
             match pick {
                 Some(i) => {
                     taken[i] = true;

@@ -21,6 +21,7 @@ mod edit;
 mod parity;
 
 use glam::DVec3;
+use smallvec::SmallVec;
 
 pub use curves::{chains, curve_distance};
 pub use parity::{odd_regions, pair_up};
@@ -38,6 +39,8 @@ pub struct Rules {
     pub tolerance: f64,
     /// Largest distance of chords from the curves.
     pub curve_tolerance: f64,
+    /// No edge on a curve is made shorter than this for the sake of that.
+    pub shortest: f64,
     /// Sizes are not lowered below this beforehand.
     pub least_size: f64,
     /// Nor below this where the distance proves too large afterwards.
@@ -50,6 +53,10 @@ pub struct Rules {
 const ADAPTATIONS: usize = 4;
 /// Rounds of edits between two such measurements.
 const ROUNDS: usize = 5;
+/// Passes of collapses in a round; all but the first look only next to what the one before did.
+const COLLAPSES: usize = 24;
+/// The same for flips.
+const FLIPS: usize = 12;
 
 /// The remesher at work.
 struct Remesher<'a, 'g> {
@@ -58,13 +65,15 @@ struct Remesher<'a, 'g> {
     rules: Rules,
     /// Curve vertices that are not wanted any more.
     surplus: Vec<bool>,
+    /// Vertices far from all that changed: they are neither moved nor are edges between them flipped.
+    asleep: Vec<bool>,
 }
 
 /// Remeshes the workshop of `ground`; each vertex's size says how long edges should be there.
 pub fn remesh(mesh: &mut Mixed, ground: &Ground<'_>, rules: Rules, watch: &Watch) -> Result<(), Cancelled> {
-    let mut work = Remesher { surplus: Vec::new(), mesh, ground, rules };
+    let mut work = Remesher { surplus: Vec::new(), asleep: Vec::new(), mesh, ground, rules };
     work.note_normals();
-    work.adapt(ADAPTATIONS, watch)
+    work.adapt(ADAPTATIONS, &[], watch)
 }
 
 /// Lowers the size about some places (a point, how far about it, the size) and remeshes again.
@@ -77,18 +86,19 @@ pub fn tighten(
 ) -> Result<(), Cancelled> {
     let all: Vec<u32> = mesh.vertices().collect();
     let tree = SegmentBvh::new(all.iter().map(|&v| [mesh.point(v); 2]).collect());
+    let before: Vec<f64> = (0..mesh.vertex_slots()).map(|v| mesh.size(v)).collect();
     for &(at, reach, size) in places {
         for i in tree.in_box(&Aabb::of([at]).grown(reach)) {
             let v = all[i as usize];
             mesh.set_size(v, mesh.size(v).min(size.max(rules.floor)));
         }
     }
-    Remesher { surplus: Vec::new(), mesh, ground, rules }.adapt(1, watch)
+    Remesher { surplus: Vec::new(), asleep: Vec::new(), mesh, ground, rules }.adapt(0, &before, watch)
 }
 
 /// Rounds of flips and smoothing only, curve vertices evenly spread.
 pub fn polish(mesh: &mut Mixed, ground: &Ground<'_>, rules: Rules, rounds: usize) {
-    let mut work = Remesher { surplus: Vec::new(), mesh, ground, rules };
+    let mut work = Remesher { surplus: Vec::new(), asleep: Vec::new(), mesh, ground, rules };
     work.even_curves();
     for _ in 0..rounds {
         work.flip();
@@ -99,17 +109,20 @@ pub fn polish(mesh: &mut Mixed, ground: &Ground<'_>, rules: Rules, rounds: usize
         if work.mesh.is_vertex(v)
             && let Place::Region(region) = work.mesh.place(v)
         {
-            let foot = ground.project(region, work.mesh.point(v));
+            let foot = ground.project_from(region, work.mesh.point(v), work.mesh.point(v));
             work.mesh.set_point(v, foot.point, foot.normal);
         }
     }
 }
 
 impl Remesher<'_, '_> {
-    /// Rounds of edits, and so many times lower sizes where they prove too large.
-    fn adapt(&mut self, times: usize, watch: &Watch) -> Result<(), Cancelled> {
+    /// Rounds of edits, and so many times lower sizes where they prove too large. Where the sizes `before` are given, only
+    /// near those that are others now.
+    fn adapt(&mut self, times: usize, before: &[f64], watch: &Watch) -> Result<(), Cancelled> {
         self.grade();
         self.resample_curves();
+        self.grade();
+        self.send_to_sleep(before);
         for adaptation in 0..=times {
             for round in 0..ROUNDS {
                 watch.check()?;
@@ -121,15 +134,36 @@ impl Remesher<'_, '_> {
                     break;
                 }
             }
-            self.mesh.compact();
+            if self.mesh.compact() {
+                self.asleep.clear();
+            }
             self.surplus.clear();
             if adaptation == times || !self.lower_sizes() {
                 break;
             }
             self.grade();
             self.resample_curves();
+            self.grade();
         }
         Ok(())
+    }
+
+    /// Lets only those vertices take part whose size is another than before, or a neighbour's.
+    fn send_to_sleep(&mut self, before: &[f64]) {
+        self.asleep = vec![true; before.len()];
+        for v in self.mesh.vertices() {
+            if before.get(v as usize) != Some(&self.mesh.size(v)) {
+                for w in std::iter::once(v).chain(self.mesh.neighbours(v)) {
+                    if let Some(asleep) = self.asleep.get_mut(w as usize) {
+                        *asleep = false;
+                    }
+                }
+            }
+        }
+    }
+
+    fn is_asleep(&self, v: u32) -> bool {
+        self.asleep.get(v as usize).copied().unwrap_or(false)
     }
 
     fn size_of(&self, h: u32) -> f64 {
@@ -158,29 +192,36 @@ impl Remesher<'_, '_> {
         for _ in 0..12 {
             let mut long: Vec<(f64, u32)> = Vec::new();
             for h in self.mesh.edges() {
-                let excess = self.mesh.length(h) / self.size_of(h);
-                if excess > 4.0 / 3.0 && self.is_inner(h) {
-                    long.push((self.mesh.length(h), h));
+                let length = self.mesh.length(h);
+                if length > 4.0 / 3.0 * self.size_of(h) && self.is_inner(h) {
+                    long.push((length, h));
                 }
             }
             if long.is_empty() {
                 break;
             }
             long.sort_by(|x, y| y.0.total_cmp(&x.0).then(x.1.cmp(&y.1)));
+            let before = self.mesh.face_slots();
             for (_, h) in long {
                 if self.is_inner(h) {
                     self.split_inner(h);
                 }
             }
-            self.flip();
+            let made = before..self.mesh.face_slots();
+            self.flip_from(made.filter(|&f| self.mesh.is_face(f)).flat_map(|f| self.edges_of(f)).collect());
         }
+    }
+
+    /// The edges of a face, by their even half-edges.
+    fn edges_of(&self, f: u32) -> SmallVec<[u32; 4]> {
+        self.mesh.sides(f).map(|h| h & !1).collect()
     }
 
     /// Halves an edge inside a region, on the surface.
     fn split_inner(&mut self, h: u32) {
         let region = self.mesh.region(self.mesh.face(h));
         let middle = 0.5 * (self.mesh.point(self.mesh.origin(h)) + self.mesh.point(self.mesh.target(h)));
-        let foot = self.ground.project(region, middle);
+        let foot = self.ground.project_from(region, middle, self.mesh.point(self.mesh.origin(h)));
         let size = self.size_of(h);
         let beside = [h, h ^ 1].map(|k| self.mesh.face_normal(self.mesh.face(k)));
         let across = foot.normal.dot(beside[0] + beside[1]) < 0.3;
@@ -200,29 +241,43 @@ impl Remesher<'_, '_> {
 
     fn collapse_short(&mut self) -> usize {
         let mut collapsed = 0;
-        for _ in 0..8 {
-            let before = collapsed;
-            for h in (0..self.mesh.halfedge_slots()).step_by(2) {
-                if !self.mesh.is_halfedge(h) {
-                    continue;
-                }
-                let is_short = self.mesh.length(h) < 0.8 * self.size_of(h);
-                if self.mesh.arc(h) != NONE {
-                    for k in [h, h ^ 1] {
-                        if self.is_surplus(self.mesh.target(k)) && self.collapse(k) {
-                            collapsed += 1;
-                            break;
-                        }
-                    }
-                } else if is_short && (self.collapse(h) || self.collapse(h ^ 1)) {
-                    collapsed += 1;
+        let mut waiting: Vec<u32> = self.mesh.edges().collect();
+        for _ in 0..COLLAPSES {
+            let mut kept = Vec::new();
+            for h in waiting {
+                if self.mesh.is_halfedge(h)
+                    && let Some(v) = self.collapse_edge(h)
+                {
+                    kept.push(v);
                 }
             }
-            if 50 * (collapsed - before) <= self.mesh.faces().count() {
+            if kept.is_empty() {
                 break;
             }
+            collapsed += kept.len();
+            // What a collapse makes possible lies next to it.
+            let near = kept.into_iter().filter(|&v| self.mesh.is_vertex(v)).flat_map(|v| self.mesh.faces_at(v));
+            waiting = near.flat_map(|f| self.edges_of(f)).collect();
+            waiting.sort_unstable();
+            waiting.dedup();
         }
         collapsed
+    }
+
+    /// Collapses an edge that is too short, or at a curve's vertex that is not wanted. Returns the vertex that stays.
+    fn collapse_edge(&mut self, h: u32) -> Option<u32> {
+        let ways = [h, h ^ 1];
+        let wanted = |work: &Self, k: u32| {
+            if work.mesh.arc(h) == NONE {
+                work.mesh.length(h) < 0.8 * work.size_of(h)
+            } else {
+                work.is_surplus(work.mesh.target(k))
+            }
+        };
+        ways.into_iter().find_map(|k| {
+            let kept = self.mesh.origin(k);
+            (wanted(self, k) && self.collapse(k)).then_some(kept)
+        })
     }
 
     fn is_surplus(&self, v: u32) -> bool {
@@ -230,14 +285,24 @@ impl Remesher<'_, '_> {
     }
 
     fn flip(&mut self) {
-        for _ in 0..3 {
-            let mut flips = 0;
-            for h in (0..self.mesh.halfedge_slots()).step_by(2) {
-                if self.is_inner(h) && self.try_flip(h) {
-                    flips += 1;
+        let awake = |h: &u32| !self.is_asleep(self.mesh.origin(*h)) || !self.is_asleep(self.mesh.target(*h));
+        self.flip_from(self.mesh.edges().filter(awake).collect());
+    }
+
+    /// Flips these edges where that makes triangles better, and then what lies next to the flips.
+    fn flip_from(&mut self, mut waiting: Vec<u32>) {
+        for _ in 0..FLIPS {
+            waiting.sort_unstable();
+            waiting.dedup();
+            let before = self.mesh.face_slots();
+            for &h in &waiting {
+                if self.is_inner(h) {
+                    self.try_flip(h);
                 }
             }
-            if 100 * flips < self.mesh.faces().count() {
+            let made = before..self.mesh.face_slots();
+            waiting = made.filter(|&f| self.mesh.is_face(f)).flat_map(|f| self.edges_of(f)).collect();
+            if waiting.is_empty() {
                 break;
             }
         }
@@ -245,7 +310,7 @@ impl Remesher<'_, '_> {
 
     fn smooth(&mut self) {
         for v in 0..self.mesh.vertex_slots() {
-            if !self.mesh.is_vertex(v) {
+            if !self.mesh.is_vertex(v) || self.is_asleep(v) {
                 continue;
             }
             if let Place::Region(region) = self.mesh.place(v) {
@@ -265,7 +330,7 @@ impl Remesher<'_, '_> {
                 let normal = normal.normalize_or_zero();
                 let step = centre / weight - at;
                 let wish = at + step - normal * normal.dot(step);
-                let foot = self.ground.project(region, wish);
+                let foot = self.ground.project_from(region, wish, at);
                 self.try_move(v, foot.point, foot.normal, Place::Region(region));
             }
         }

@@ -45,7 +45,7 @@ pub fn pair_up(mesh: &mut Mixed, ground: &Ground<'_>, rules: Rules) -> usize {
         }
     }
     let (order, parent) = tree(&beside, outside);
-    let mut work = Remesher { mesh, ground, rules, surplus: Vec::new() };
+    let mut work = Remesher { mesh, ground, rules, surplus: Vec::new(), asleep: Vec::new() };
     let mut splits = 0;
     for &region in order.iter().rev() {
         let Some((up, h)) = parent[region] else { continue };

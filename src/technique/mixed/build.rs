@@ -102,11 +102,11 @@ impl Mixed {
         list
     }
 
-    /// Gives dead slots back.
-    pub fn compact(&mut self) {
+    /// Gives dead slots back where they are the greater part. Whether it did; then all numbers are new.
+    pub fn compact(&mut self) -> bool {
         let dead = |column: &[u32]| column.iter().filter(|&&x| x == NONE).count();
         if 2 * dead(&self.first) < self.first.len() {
-            return;
+            return false;
         }
         let mut halfedge = vec![NONE; self.next.len()];
         let mut vertex = vec![NONE; self.out.len()];
@@ -148,6 +148,7 @@ impl Mixed {
         self.sizes = (0..vertex.len()).filter(|&i| vertex[i] != NONE).map(|i| self.sizes[i]).collect();
         self.stamps = vec![0; self.first.len()];
         self.epoch = 0;
+        true
     }
 
     /// What is wrong with the structure, for tests: links that do not fit, faces of other sizes, stars that break.

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use crate::mesh::edit::{check_flip, check_split, flip, relocate, slide, split};
-use crate::mesh::geometry::{area_vector, stretch, triangle_size};
+use crate::mesh::geometry::{area_vector, closest_on_segment, stretch, triangle_size};
 use crate::mesh::halfedge::{edge_of, halfedge_of, twin};
 use crate::mesh::{EdgeId, FaceId, Freedom, HalfedgeId, VertexId};
 use crate::technique::collapse::limits::least_stretch;
@@ -23,6 +23,8 @@ pub enum Gain {
     Mend(f64),
     /// The least stretch rises.
     LeastStretch,
+    /// The smallest angle rises: in a plane such flips end in the Delaunay triangulation.
+    LeastAngle,
     /// The product of least and mean stretch rises, and the least does not fall below the threshold.
     Quality,
     /// The mean stretch rises, and no face falls below this stretch that was not.
@@ -50,6 +52,7 @@ impl Editor<'_> {
             let points = corners.map(|v| self.mesh.point(v));
             self.patch.points.push(points);
         }
+        self.patch.is_same = self.is_plane(left, right);
         let normals = [left, right].map(|f| area_vector(self.mesh.corner_points(f)));
         let flat = normals[0].dot(normals[1]) >= FLAT_COSINE * (normals[0].length() * normals[1].length());
         if !(flat || self.keeper.is_certified()) || !self.gains(&before, gain) || self.flip_folds(normals) {
@@ -74,11 +77,22 @@ impl Editor<'_> {
         let most = self.limits.max_valence as i64;
         let tallest = ends.map(valence).into_iter().max().unwrap_or(0);
         let is_worth_it = match gain {
-            Gain::Mend(_) | Gain::LeastStretch => true,
+            Gain::Mend(_) | Gain::LeastStretch | Gain::LeastAngle => true,
             Gain::Quality | Gain::Mean(_) | Gain::Keep(_) | Gain::None => false,
         };
         is_worth_it && apexes.iter().all(|&v| valence(v) < most.max(tallest))
             || apexes.iter().all(|&v| valence(v) < most)
+    }
+
+    /// Whether two faces lie in one plane, by far nearer than the tolerance: then a flip that does not fold leaves the
+    /// surface as it is, as a set of points.
+    pub fn is_plane(&self, left: FaceId, right: FaceId) -> bool {
+        let Keeper::Distance { envelope, .. } = &self.keeper else { return false };
+        let (near, faces) = (1e-6 * envelope.reach(), [left, right].map(|f| self.mesh.corner_points(f)));
+        let vectors = faces.map(area_vector);
+        let large = usize::from(vectors[1].length_squared() > vectors[0].length_squared());
+        let Some(normal) = vectors[large].try_normalize() else { return false };
+        faces[1 - large].iter().all(|&p| normal.dot(p - faces[large][0]).abs() <= near)
     }
 
     /// Whether a new face of a flip turns away from both old ones.
@@ -127,6 +141,8 @@ impl Editor<'_> {
             self.patch.ids.push(id);
             self.patch.points.push(points);
         }
+        let [p, q] = [i, j].map(|v| self.mesh.point(v));
+        self.patch.is_same = closest_on_segment(at, [p, q]).distance_squared <= 1e-24 * p.distance_squared(q);
         if !self.split_keeps_stretch() || self.split_folds() || !self.patch_admitted() {
             return None;
         }
@@ -207,7 +223,9 @@ impl Editor<'_> {
     fn tally(&self, faces: &[FaceId], gain: Gain) -> Tally {
         let mut tally = match gain {
             Gain::Mend(threshold) => Tally::short_of(threshold),
-            Gain::LeastStretch | Gain::Quality | Gain::Mean(_) | Gain::Keep(_) | Gain::None => Tally::new(),
+            Gain::LeastStretch | Gain::LeastAngle | Gain::Quality | Gain::Mean(_) | Gain::Keep(_) | Gain::None => {
+                Tally::new()
+            }
         };
         for &f in faces {
             tally.add(self.stretch(f), self.size(f));
@@ -232,6 +250,11 @@ impl Editor<'_> {
                 after.stretch_min >= least_stretch(before.threshold, before.stretch_min) && after.mends(before)
             }
             Gain::LeastStretch => after.stretch_min > before.stretch_min * (1.0 + 1e-3),
+            Gain::LeastAngle => {
+                let old = self.patch.old.iter().map(|&f| least_sine(self.mesh.corner_points(f)));
+                let new = self.patch.points.iter().map(|&points| least_sine(points));
+                new.fold(1.0, f64::min) > old.fold(1.0, f64::min) * (1.0 + 1e-6)
+            }
             Gain::Quality => after.stretch_min >= floor && after.quality() > before.quality() * (1.0 + 2e-3),
             Gain::Mean(least) => {
                 after.stretch_min >= least_stretch(least, before.stretch_min).max(floor)
@@ -241,4 +264,12 @@ impl Editor<'_> {
             Gain::None => after.stretch_min >= floor,
         }
     }
+}
+
+/// The sine of the smallest angle: twice the area over the product of the two longer sides.
+fn least_sine([a, b, c]: [DVec3; 3]) -> f64 {
+    let squares = [(b - a).length_squared(), (c - b).length_squared(), (a - c).length_squared()];
+    let [x, y, z] = squares;
+    let longer = (x * y).max(y * z).max(z * x);
+    if longer > 0.0 { ((b - a).cross(c - a).length_squared() / longer).sqrt() } else { 0.0 }
 }

@@ -61,6 +61,7 @@ pub fn touch_up(
     watch: &Watch,
 ) -> Result<(), Cancelled> {
     let rules = CollapseRules { mend_below: Some(threshold), min_stretch: threshold, mean_stretch: 0.0, ..*rules };
+    let mut failed = BTreeMap::new();
     for round in 0..MOST_ROUNDS {
         let bad = faces_below(editor, threshold);
         if round == 0 {
@@ -72,8 +73,14 @@ pub fn touch_up(
             if place.is_multiple_of(64) {
                 watch.check()?;
             }
-            if editor.mesh().face_is_live(f) && editor.stretch(f) < threshold {
-                gained |= mend(editor, f, &rules);
+            let is_open = editor.mesh().face_is_live(f) && editor.stretch(f) < threshold;
+            if !is_open || failed.get(&f) == Some(&age(editor, f)) {
+                continue;
+            }
+            if mend(editor, f, &rules) {
+                gained = true;
+            } else {
+                failed.insert(f, age(editor, f));
             }
         }
         if !gained {
