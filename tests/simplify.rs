@@ -322,6 +322,24 @@ fn needles_become_good_triangles() {
 }
 
 #[test]
+fn a_mean_stretch_ends_coarsening() {
+    // A wavy sheet of even triangles: its bends ask for small ones, its valleys do not.
+    let mut mesh = grid(40);
+    for p in &mut mesh.points {
+        (p.x, p.y) = (p.x - 0.5 * p.y, 0.75_f64.sqrt() * p.y);
+        p.z = 2.0 * libm::sin(0.4 * p.x) * libm::cos(0.15 * p.y);
+    }
+    let input = ControlPropertiesInput { surface: &mesh, reference: &mesh, locks: LockRules::default() };
+    let [free, even] = [0.0, 0.91].map(|mean_stretch| {
+        let tolerance = Length::Percent(1.0);
+        let params = ControlPropertiesParams { tolerance, mean_stretch, ..ControlPropertiesParams::default() };
+        control_properties(input, &params, &Watch::silent()).expect("the parameters fit").1
+    });
+    assert!(free.mean_stretch < 0.91, "{free:?}");
+    assert!(even.mean_stretch >= 0.91 && even.faces_after < even.faces_before, "{even:?}");
+}
+
+#[test]
 fn a_percent_is_no_squared_length() {
     let mesh = octahedron();
     let params = ControlPropertiesParams {

@@ -31,7 +31,9 @@ use crate::step::{
     Artifact, InputDef, Inputs, Length, Locks, OutPort, OutputDef, Port, Produced, ResolvedSizing, Sizing, StepFailure,
 };
 use crate::technique::collapse::session::{Setup, ToleranceMode, diagonal, open, recount, reference_tree};
-use crate::technique::collapse::{CollapseRules, Counts, Editor, Ending, Limits, Order, Priority, SizeField, simplify};
+use crate::technique::collapse::{
+    CollapseRules, Counts, Editor, Ending, Goal, Limits, Order, Priority, SizeField, simplify,
+};
 use crate::technique::hierarchy::{Front, extract};
 use crate::technique::levels::{HierarchyReport, Recorded, Source, build};
 use crate::technique::refine::{MAX_FACES, MaxEdge, RefineError, refine};
@@ -298,8 +300,8 @@ fn optimises(params: &ImproveQualityParams) -> bool {
 
 fn run_phases(editor: &mut Editor<'_>, params: &ImproveQualityParams, watch: &Watch) -> Result<Ending, Cancelled> {
     let rules = rules(params);
-    let target = params.target_faces.unwrap_or(0);
-    if optimises(params) { coarsen(editor, &rules, target, watch) } else { simplify(editor, &rules, target, watch) }
+    let goal = Goal { faces: params.target_faces.unwrap_or(0), ..Goal::default() };
+    if optimises(params) { coarsen(editor, &rules, goal, watch) } else { simplify(editor, &rules, goal, watch) }
 }
 
 /// Selective subdivision; `None` where nothing was asked for.
@@ -374,7 +376,7 @@ pub struct Step;
 
 impl crate::step::Step for Step {
     const NAME: &'static str = "improve-quality";
-    const REVISION: u32 = 9;
+    const REVISION: u32 = 10;
     const INPUTS: &'static [InputDef] = &[
         InputDef { name: "from", accepts: &[Port::Surface], required: true, doc: "the surface to improve" },
         InputDef {

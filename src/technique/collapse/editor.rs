@@ -182,6 +182,13 @@ impl<'a> Editor<'a> {
         self.mesh
     }
 
+    /// The mean stretch of all live faces; 1 where there are none. O(F).
+    pub fn mean_stretch(&self) -> f64 {
+        let sum: f64 = self.mesh.faces().map(|f| self.stretch(f)).sum();
+        let count = self.mesh.face_count();
+        if count == 0 { 1.0 } else { sum / count as f64 }
+    }
+
     /// The stretch of a live face.
     #[inline]
     pub fn stretch(&self, f: FaceId) -> f64 {

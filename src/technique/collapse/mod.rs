@@ -51,25 +51,46 @@ pub use priority::Priority;
 pub enum Ending {
     /// The number of faces asked for is reached.
     Target,
+    /// The mean stretch would fall below the one asked for.
+    Mean,
     /// No edge is valid any more.
     Exhausted,
+}
+
+/// Where collapses end before no edge is valid any more.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Goal {
+    /// When this many faces are left.
+    pub faces: usize,
+    /// Before the mean stretch falls below this; 0 where it does not matter.
+    pub mean_stretch: f64,
 }
 
 /// How many collapses pass between two looks at the watch.
 const WATCH_EVERY: usize = 512;
 
-/// Collapses valid edges, best first, until `target` faces are left or no edge is valid.
+/// The part of the faces that goes between two looks at the mean stretch.
+const LOOK_AT_MEAN: f64 = 0.005;
+
+/// Collapses valid edges, best first, until the goal is reached or no edge is valid.
 pub fn simplify(
     editor: &mut Editor<'_>,
     rules: &CollapseRules,
-    target: usize,
+    goal: Goal,
     watch: &Watch,
 ) -> Result<Ending, Cancelled> {
     let start = editor.mesh().face_count();
-    watch.phase("collapse", Some(start.saturating_sub(target) as u64));
+    watch.phase("collapse", Some(start.saturating_sub(goal.faces) as u64));
     let mut queue = Queue::new(editor, rules, watch)?;
     let mut done = 0_usize;
-    while editor.mesh().face_count() > target {
+    let mut look_at = if goal.mean_stretch > 0.0 { start } else { 0 };
+    while editor.mesh().face_count() > goal.faces {
+        if editor.mesh().face_count() <= look_at {
+            if editor.mean_stretch() < goal.mean_stretch {
+                return Ok(Ending::Mean);
+            }
+            look_at = ((1.0 - LOOK_AT_MEAN) * look_at as f64) as usize;
+        }
         if queue.collapse_next(editor, rules).is_none() {
             return Ok(Ending::Exhausted);
         }

@@ -10,7 +10,7 @@ use crate::mesh::geometry::{Aabb, area_vector};
 use crate::mesh::predicate::triangle_triangle;
 use crate::mesh::{Carried, EdgeKey, FaceId, IdVec, LockRules, Rim, Surface, VertexId, edge_key, resolve_freedom};
 use crate::technique::collapse::session::{Setup, ToleranceMode, open};
-use crate::technique::collapse::{CollapseRules, Limits, Order, Priority, SizeField};
+use crate::technique::collapse::{CollapseRules, Goal, Limits, Order, Priority, SizeField};
 use crate::technique::refine::{MaxEdge, refine};
 use crate::technique::remesh::coarsen;
 use crate::technique::triangulate_loop::Loop;
@@ -117,7 +117,7 @@ impl Fill {
             order: Order::OnSurface,
             priority: Priority::QualityGain,
         };
-        coarsen(&mut editor, &rules, 0, &Watch::silent())?;
+        coarsen(&mut editor, &rules, Goal::default(), &Watch::silent())?;
         let left = editor.into_mesh().leave();
         Ok(self.stitched(&left))
     }

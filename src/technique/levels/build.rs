@@ -8,7 +8,7 @@ use crate::mesh::halfedge::EnterError;
 use crate::mesh::transfer::inherit_fields;
 use crate::mesh::{FreedomError, Hierarchy, LockRules, Surface, resolve_freedom};
 use crate::technique::collapse::session::{Setup, open};
-use crate::technique::collapse::{CollapseRules, Counts, simplify};
+use crate::technique::collapse::{CollapseRules, Counts, Goal, simplify};
 use crate::technique::curvature::{Principal, mean_edge, principal_curvatures};
 use crate::technique::hierarchy::Recorder;
 use crate::technique::remesh::{coarsen_purely, optimise, raise_stretch};
@@ -81,7 +81,7 @@ where
     if optimise_first {
         coarsen_purely(&mut editor, rules, watch)?;
     } else {
-        simplify(&mut editor, rules, 0, watch)?;
+        simplify(&mut editor, rules, Goal::default(), watch)?;
     }
     let hierarchy = editor.take_recorder().map(Recorder::finish).unwrap_or_default();
     let distance_bound = editor.certified_distance(setup.tolerance);

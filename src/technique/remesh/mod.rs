@@ -4,9 +4,11 @@
 //! tangential relaxation, projection), each edit admitted by the [`Editor`] only: thresholds, certified tolerance and
 //! embedding hold after every one of them, and it must gain, so that the passes end.
 //!
-//! Where no face is poor any more, the mean is raised: see [`coarsen`]. [`raise_stretch`] repairs the faces below a threshold before and after.
+//! Where no face is poor any more, the mean is raised: see [`coarsen`]. [`raise_stretch`] repairs the faces below a
+//! threshold before and after.
 
 mod cavity;
+mod descent;
 mod edit;
 mod ops;
 mod passes;
@@ -14,24 +16,15 @@ mod raise;
 mod regular;
 mod search;
 
+use descent::Descent;
 pub use ops::Gain;
 use passes::{Refusals, flip_edges, relax, relax_vertices, split_long_edges};
 use raise::settle_in;
 pub use raise::{faces_below, raise_stretch, touch_up};
 use regular::flip_to_regular;
 
-use crate::technique::collapse::{CollapseRules, Editor, Ending, simplify};
+use crate::technique::collapse::{CollapseRules, Editor, Ending, Goal, simplify};
 use crate::watch::{Cancelled, Watch};
-
-/// Least and mean stretch that optimised coarsening asks of new stars, in falling steps.
-const COMFORT: [(f64, f64); 3] = [(0.7, 0.88), (0.6, 0.83), (0.5, 0.78)];
-
-/// Further steps for meshes that the first ones hardly coarsen, such as grids of right-angled triangles, where the first
-/// collapse always makes its star less even.
-const LESS_COMFORT: [(f64, f64); 2] = [(0.4, 0.65), (0.3, 0.5)];
-
-/// The part of the faces that must be gone for the further steps to be left out.
-const COARSENED: f64 = 0.25;
 
 /// What optimised faces should reach beyond the threshold asked for, with all means, and with single edits.
 const GOOD: f64 = 0.35;
@@ -46,44 +39,37 @@ const ROUNDS: [usize; 2] = [2, 8];
 /// Rounds of flips towards regular valences and of moves that raise the mean, at the end.
 const EVENING: usize = 4;
 
-/// Coarsens to `target` faces, or until no edge is valid, with optimisation in between.
+/// Coarsens to the goal, or until no edge is valid, with optimisation in between.
 ///
-/// The stretch that new faces need starts high and falls in steps, so that poor collapses are only done when a target
-/// asks for them; without a target they are not done.
-pub fn coarsen(
-    editor: &mut Editor<'_>,
-    rules: &CollapseRules,
-    target: usize,
-    watch: &Watch,
-) -> Result<Ending, Cancelled> {
-    let mut ending = Ending::Exhausted;
+/// The stretch that new faces need starts high and falls in steps, so that poor collapses are only done when a number of
+/// faces asks for them; without one they are not done. Towards a mean stretch it goes down until evening out leaves little
+/// more than was asked for.
+pub fn coarsen(editor: &mut Editor<'_>, rules: &CollapseRules, goal: Goal, watch: &Watch) -> Result<Ending, Cancelled> {
     let mut refusals = Refusals::default();
-    let start = editor.mesh().face_count() as f64;
-    for (place, (least, mean)) in COMFORT.into_iter().chain(LESS_COMFORT).enumerate() {
-        if place >= COMFORT.len() && (editor.mesh().face_count() as f64) < (1.0 - COARSENED) * start {
-            break;
-        }
-        let rules = CollapseRules { min_stretch: least.max(rules.min_stretch), mean_stretch: mean, ..*rules };
-        ending = simplify(editor, &rules, target, watch)?;
-        optimise_with(editor, ROUNDS[0], &mut refusals, watch)?;
-        if ending == Ending::Target {
-            break;
-        }
+    let mut descent = Descent::new(editor, rules, goal);
+    let mut ending = descent.go_down(editor, &mut refusals, watch)?;
+    finish(editor, rules, &mut refusals, watch)?;
+    while ending == Ending::Mean && descent.may_go_on(editor) {
+        ending = descent.go_down(editor, &mut refusals, watch)?;
+        finish(editor, rules, &mut refusals, watch)?;
     }
-    let (mut comfort, _) = COMFORT[COMFORT.len() - 1];
-    while ending == Ending::Exhausted && target > 0 && comfort > rules.min_stretch {
-        comfort = (comfort - 0.1).max(rules.min_stretch);
-        ending = simplify(editor, &CollapseRules { min_stretch: comfort, ..*rules }, target, watch)?;
-        optimise_with(editor, 1, &mut refusals, watch)?;
-    }
-    optimise_with(editor, ROUNDS[1], &mut refusals, watch)?;
-    even_out(editor, GOOD.max(rules.min_stretch), watch)?;
     for threshold in [rules.min_stretch, GOOD.max(rules.min_stretch)] {
         raise_stretch(editor, threshold, rules, watch)?;
     }
     touch_up(editor, BETTER.max(rules.min_stretch), rules, watch)?;
     mend_stubborn(editor, rules, watch)?;
     Ok(ending)
+}
+
+/// Rounds of optimisation after the last collapses.
+fn finish(
+    editor: &mut Editor<'_>,
+    rules: &CollapseRules,
+    refusals: &mut Refusals,
+    watch: &Watch,
+) -> Result<(), Cancelled> {
+    optimise_with(editor, ROUNDS[1], refusals, watch)?;
+    even_out(editor, GOOD.max(rules.min_stretch), watch)
 }
 
 /// Once more where faces are below the threshold still, and past it: what was done about their neighbours meanwhile, and
@@ -122,11 +108,11 @@ fn even_out(editor: &mut Editor<'_>, least: f64, watch: &Watch) -> Result<(), Ca
 
 /// Collapses until no edge is valid, those that leave good faces first, and nothing else in between.
 pub fn coarsen_purely(editor: &mut Editor<'_>, rules: &CollapseRules, watch: &Watch) -> Result<Ending, Cancelled> {
-    for (least, mean) in COMFORT.into_iter().chain(LESS_COMFORT) {
+    for (least, mean) in descent::COMFORT.into_iter().chain(descent::LESS_COMFORT) {
         let rules = CollapseRules { min_stretch: least.max(rules.min_stretch), mean_stretch: mean, ..*rules };
-        simplify(editor, &rules, 0, watch)?;
+        simplify(editor, &rules, Goal::default(), watch)?;
     }
-    simplify(editor, rules, 0, watch)
+    simplify(editor, rules, Goal::default(), watch)
 }
 
 /// Rounds of splits, flips and relaxation. Returns the number of edits that gained in the last round.
