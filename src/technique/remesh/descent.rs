@@ -22,10 +22,10 @@ const COARSENED: f64 = 0.25;
 const GAIN_AT_END: f64 = 0.02;
 
 /// The part of what the rounds between two steps gained that the next step may count on.
-const COUNTED_ON: f64 = 0.5;
+const COUNTED_ON: f64 = 0.25;
 
 /// The same for the rounds at the end, which gain less every time.
-const COUNTED_ON_AT_END: f64 = 0.8;
+const COUNTED_ON_AT_END: f64 = 0.6;
 
 /// Steps that take fewer of the faces are not repeated.
 const MUCH: f64 = 0.01;
