@@ -179,6 +179,10 @@ impl<P: Primitive> Bvh<P> {
                 continue;
             }
             for i in first as usize..(first + count) as usize {
+                // Nearest points lie in the box of their primitive, so this is exact.
+                if self.primitives[i].bounds().distance_squared(p) > best.distance_squared {
+                    continue;
+                }
                 let nearest = self.primitives[i].nearest(p);
                 let candidate = self.indices[i];
                 let closer = nearest.distance_squared < best.distance_squared;

@@ -103,7 +103,9 @@ pub(super) fn refine(corners: [(DVec3, (f64, u32)); 3], to: &Target, limits: &Li
         }
         let centre = piece.iter().map(|c| c.point).sum::<DVec3>() / piece.len() as f64;
         let radius = piece.iter().map(|c| (c.point - centre).length_squared()).fold(0.0, f64::max).sqrt();
-        let Some(found) = to.bvh.closest(centre) else { break };
+        let near = |c: &Corner| closest_on_triangle(centre, to.triangles[c.nearest as usize]).distance_squared;
+        let known = piece.iter().map(near).fold(f64::INFINITY, f64::min);
+        let Some(found) = to.bvh.closest_within(centre, known).or_else(|| to.bvh.closest(centre)) else { break };
         bound.reach(found.distance(), centre);
         let best = by_corners.min(found.distance() + radius).min(to_triangle(&piece, to, found.index));
         if best <= accept || radius <= limits.radius || seen >= most_pieces {

@@ -2,9 +2,9 @@
 
 use glam::DVec3;
 
-use crate::mesh::Surface;
 use crate::mesh::bvh::SegmentBvh;
-use crate::metric::distance::{Target, decide, one_sided};
+use crate::metric::distance::{Target, decide_where, upper_bound};
+use crate::technique::ground::Ground;
 use crate::technique::mixed::Mixed;
 use crate::watch::{Cancelled, Watch};
 
@@ -13,9 +13,12 @@ pub(super) struct Check {
     pub(super) surface: Target,
     /// The points of the surface.
     pub(super) corners: SegmentBvh,
+    /// The region of each of its faces.
+    regions: Vec<u32>,
 }
 
 /// A place where quads and surface are too far apart.
+#[derive(Clone, Copy)]
 pub(super) struct Fault {
     /// The face nearest to it.
     pub(super) face: u32,
@@ -26,21 +29,33 @@ pub(super) struct Fault {
 }
 
 impl Check {
-    pub(super) fn new(surface: &Surface) -> Self {
+    pub(super) fn new(ground: &Ground<'_>) -> Self {
+        let surface = ground.surface;
         let corners = SegmentBvh::new(surface.points.iter().map(|&p| [p, p]).collect());
-        Self { surface: Target::of(&surface.to_soup()), corners }
+        Self { surface: Target::of(&surface.to_soup()), corners, regions: ground.regions.clone() }
     }
 
-    /// The places where the mesh and the surface are farther apart than `tolerance`, by a witness in each face at fault.
-    pub(super) fn beyond(&self, mesh: &Mixed, tolerance: f64, watch: &Watch) -> Result<Vec<Fault>, Cancelled> {
+    /// The places where the mesh and the surface are farther apart than `tolerance`, by a witness in each face at fault,
+    /// in regions that are `awake`.
+    pub(super) fn beyond(
+        &self,
+        mesh: &Mixed,
+        tolerance: f64,
+        awake: &[bool],
+        watch: &Watch,
+    ) -> Result<Vec<Fault>, Cancelled> {
         let quads = Target::of(&mesh.leave().0);
         let faces: Vec<u32> = mesh.faces().collect();
         let mut found = Vec::new();
-        for (face, p, distance) in decide(&quads, &self.surface, tolerance, watch)?.into_iter().flat_map(|d| d.beyond) {
+        let ours = |f: crate::mesh::FaceId| awake[mesh.region(faces[f.index()]) as usize];
+        let theirs = |f: crate::mesh::FaceId| awake[self.regions[f.index()] as usize];
+        let decision = decide_where(&quads, &self.surface, tolerance, &ours, watch)?;
+        for (face, p, distance) in decision.into_iter().flat_map(|d| d.beyond) {
             let at = self.surface.bvh().closest(p).map_or(p, |c| c.nearest.point);
             found.push(Fault { face: faces[face.index()], at, distance });
         }
-        for (_, at, distance) in decide(&self.surface, &quads, tolerance, watch)?.into_iter().flat_map(|d| d.beyond) {
+        let decision = decide_where(&self.surface, &quads, tolerance, &theirs, watch)?;
+        for (_, at, distance) in decision.into_iter().flat_map(|d| d.beyond) {
             if let Some(nearest) = quads.bvh().closest(at) {
                 found.push(Fault { face: faces[quads.face(nearest.index).index()], at, distance });
             }
@@ -51,8 +66,8 @@ impl Check {
     /// The certified distance between quads and surface, the larger one of both ways.
     pub(super) fn distance(&self, mesh: &Mixed, watch: &Watch) -> Result<f64, Cancelled> {
         let quads = Target::of(&mesh.leave().0);
-        let to = one_sided(&quads, &self.surface, watch)?.map_or(0.0, |d| d.upper);
-        let from = one_sided(&self.surface, &quads, watch)?.map_or(0.0, |d| d.upper);
+        let to = upper_bound(&quads, &self.surface, watch)?.unwrap_or(0.0);
+        let from = upper_bound(&self.surface, &quads, watch)?.unwrap_or(0.0);
         Ok(to.max(from))
     }
 }
@@ -73,7 +88,7 @@ pub(super) fn smaller<'a>(
 }
 
 /// The mean length of a face's sides.
-fn mean_side(mesh: &Mixed, f: u32) -> f64 {
+pub(super) fn mean_side(mesh: &Mixed, f: u32) -> f64 {
     let (sum, n) = mesh.sides(f).fold((0.0, 0.0), |(sum, n), h| (sum + mesh.length(h), n + 1.0));
     sum / n
 }

@@ -14,8 +14,8 @@
 //!
 //! The distance between triangles and surface is certified both ways first, and sizes are lowered where it is too large.
 //! The same is done with the finished quads: where they are too far away, single vertices are moved over the ridges and
-//! tips that a face cuts off (`settle`); where that is not enough, sizes are lowered and the front runs again. The best of
-//! a few attempts is kept.
+//! tips that a face cuts off (`settle`); where that is not enough, or shapes are poor, sizes are lowered there and the
+//! front runs again in the regions that changed. The best of a few attempts is kept (`attempts`).
 //!
 //! # Invariants
 //! - Curves stay chains of edges between the same nodes, and nodes stay where they are; borders of regions that
@@ -30,15 +30,16 @@
 //! The papers take the triangles as they come and keep their border edges; sampling and remeshing first is what makes
 //! the quads even. Where the paper leaves a triangle to keep a curve, the parity of the borders makes that unnecessary.
 
+mod attempts;
 mod carry;
 mod check;
 mod midpoint;
+mod reuse;
 mod settle;
 mod sizes;
 
 use std::sync::Arc;
 
-use glam::DVec3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -49,30 +50,12 @@ use crate::step::{
     Step as StepContract, StepFailure,
 };
 use crate::technique::clean_quads::{census, clean, finish, sharpest_sector};
-use crate::technique::front::advance;
 use crate::technique::ground::{Choice, Ground};
-use crate::technique::isotropic::{Rules, curve_distance, pair_up, polish, remesh, tighten};
-use crate::technique::join::{join_along_paths, join_neighbours};
+use crate::technique::isotropic::{Rules, curve_distance};
 use crate::technique::mixed::Mixed;
 use crate::watch::{Cancelled, Watch};
 
-use check::{Check, Fault, smaller};
-use settle::settle;
-
-/// How often sizes are lowered where the quads prove too far from the surface.
-const ATTEMPTS: usize = 3;
-/// How often sizes are lowered beforehand, where the triangles are too far from the surface.
-const PREPARATIONS: usize = 4;
-/// The part of the tolerance that triangles may use.
-const TRIANGLES: f64 = 0.7;
-/// What an attempt lacks from where faces are inverted or triangles are left.
-const BROKEN: f64 = 10.0;
-/// How much farther from their curves edges may be where that spares broken faces.
-const LOOSER: f64 = 2.0;
-/// Faces below this shape are not worth smaller ones.
-const USEFUL: f64 = 0.2;
-/// Shapes above this count as good.
-const FAIR: f64 = 0.5;
+use attempts::morph;
 
 /// Turns a surface into quads of a given size that follow its marked curves.
 ///
@@ -139,6 +122,9 @@ pub struct QMorphStats {
     /// Regions by what they needed: the front alone; neighbours joined; triangles joined along paths; one midpoint
     /// split of everything.
     pub regions_by_level: [usize; 4],
+    /// The same for each region.
+    #[serde(skip)]
+    pub levels: Vec<usize>,
     /// Borders of regions that were not followed.
     pub left_out: usize,
     /// Edges of curves that were halved so that each region has an even number of them.
@@ -238,8 +224,9 @@ pub fn q_morph(surface: &Surface, params: &QMorphParams, watch: &Watch) -> Resul
         (mesh, stats) = morph(&ground, params, rules, 2.0, watch)?;
         mesh = midpoint::split_all(&mesh, &ground).ok_or(QMorphError::NotManifold)?;
         stats.regions_by_level = [0, 0, 0, ground.region_count()];
-        stats.clean_edits += clean(&mut mesh, &ground, rules.curve_tolerance, watch)?.edits;
-        stats.clean_edits += finish(&mut mesh, &ground, rules.curve_tolerance, watch)?.edits;
+        let all = vec![true; ground.region_count()];
+        stats.clean_edits += clean(&mut mesh, &ground, rules.curve_tolerance, &all, watch)?.edits;
+        stats.clean_edits += finish(&mut mesh, &ground, rules.curve_tolerance, &all, watch)?.edits;
     }
     stats.curve_distance = curve_distance(&mesh, &ground);
     judge(&mesh, &mut stats);
@@ -270,163 +257,6 @@ fn rules(surface: &Surface, params: &QMorphParams, diagonal: f64) -> Result<(Rul
     Ok((rules, least))
 }
 
-/// One run from the surface to clean quads, with all sizes times `scale`.
-fn morph(
-    ground: &Ground<'_>,
-    params: &QMorphParams,
-    rules: Rules,
-    scale: f64,
-    watch: &Watch,
-) -> Result<(Mixed, QMorphStats), QMorphError> {
-    let stats = QMorphStats { regions: ground.region_count(), left_out: ground.left_out, ..QMorphStats::default() };
-    let check = Check::new(ground.surface);
-    let work = Morpher { ground, params, check: &check, scale, watch };
-    let mut best = work.attempts(rules, ATTEMPTS, &stats)?;
-    // Many pieces on a curve that is rough may be what broke it: none shorter than the least size, then a looser curve.
-    let longer = Rules { shortest: rules.least_size, ..rules };
-    let looser = Rules { curve_tolerance: LOOSER * rules.curve_tolerance, ..longer };
-    for (rules, attempts) in [(longer, ATTEMPTS), (looser, 1)] {
-        if best.lack < BROKEN {
-            break;
-        }
-        let other = work.attempts(rules, attempts, &stats)?;
-        let attempts = best.stats.attempts + other.stats.attempts;
-        if other.lack < best.lack {
-            best = other;
-        }
-        best.stats.attempts = attempts;
-    }
-    let Best { mesh, mut stats, .. } = best;
-    stats.distance = check.distance(&mesh, watch)?;
-    stats.triangles = mesh.census().0;
-    Ok((mesh, stats))
-}
-
-/// The best attempt so far.
-struct Best {
-    lack: f64,
-    mesh: Mixed,
-    stats: QMorphStats,
-}
-
-/// What all attempts share.
-struct Morpher<'a, 'g> {
-    ground: &'a Ground<'g>,
-    params: &'a QMorphParams,
-    check: &'a Check,
-    scale: f64,
-    watch: &'a Watch,
-}
-
-impl Morpher<'_, '_> {
-    /// Remeshes, and runs the front at most so many times, with smaller sizes where quads prove too far away.
-    fn attempts(&self, rules: Rules, most: usize, stats: &QMorphStats) -> Result<Best, QMorphError> {
-        let (ground, watch) = (self.ground, self.watch);
-        let mut mesh = ground.workshop().ok_or(QMorphError::NotManifold)?;
-        sizes::set(&mut mesh, ground.surface, self.params, self.scale).map_err(QMorphError::Size)?;
-        watch.phase("remeshing between the curves", None);
-        remesh(&mut mesh, ground, rules, watch)?;
-        prepare(&mut mesh, ground, self.check, rules, watch)?;
-        let mut best: Option<Best> = None;
-        for attempt in 1..=most {
-            let mut quads = mesh.clone();
-            let mut now = stats.clone();
-            advance_and_clean(&mut quads, ground, self.params, rules, &mut now, watch)?;
-            now.clean_edits += finish(&mut quads, ground, rules.curve_tolerance, watch)?.edits;
-            let faults = settle(&mut quads, ground, self.check, rules.tolerance, watch)?;
-            let lack = lack(&quads, &faults, rules.tolerance);
-            let places = wanting(&quads, &faults, rules.tolerance);
-            if best.as_ref().is_none_or(|best| lack < best.lack) {
-                best = Some(Best { lack, mesh: quads, stats: now });
-            }
-            if let Some(best) = &mut best {
-                best.stats.attempts = attempt;
-            }
-            if places.is_empty() || attempt == most {
-                break;
-            }
-            tighten(&mut mesh, ground, rules, &places, watch)?;
-        }
-        best.ok_or(QMorphError::Empty)
-    }
-}
-
-/// Lowers sizes where the triangles are too far from the surface: what they miss, quads miss more.
-fn prepare(mesh: &mut Mixed, ground: &Ground<'_>, check: &Check, rules: Rules, watch: &Watch) -> Result<(), Cancelled> {
-    let tolerance = TRIANGLES * rules.tolerance;
-    for _ in 0..PREPARATIONS {
-        let faults = check.beyond(mesh, tolerance, watch)?;
-        if faults.is_empty() {
-            break;
-        }
-        let places = smaller(mesh, &faults, tolerance);
-        tighten(mesh, ground, rules, &places, watch)?;
-    }
-    Ok(())
-}
-
-/// How much an attempt lacks: 0 where it holds to the tolerance with sound shapes.
-fn lack(mesh: &Mixed, faults: &[Fault], tolerance: f64) -> f64 {
-    let worst = faults.iter().map(|f| f.distance / tolerance - 1.0).fold(0.0, f64::max);
-    let fair = fair(mesh);
-    let (mut inverted, mut least, mut triangles) = (0.0, fair, 0.0);
-    for f in mesh.faces() {
-        let quality = mesh.quality(f);
-        inverted += f64::from(quality <= 0.0);
-        triangles += f64::from(mesh.is_triangle(f));
-        least = least.min(quality);
-    }
-    100.0 * triangles + 10.0 * inverted + 4.0 * worst + (fair - least)
-}
-
-/// The shape that each face could have: good, or as good as the sharpest corner allows.
-fn fair(mesh: &Mixed) -> f64 {
-    sharpest_sector(mesh).map_or(FAIR, |angle| FAIR.min(0.9 * libm::sin(angle)))
-}
-
-/// Where another attempt should have smaller faces: at faults of sound faces. Smaller ones would not mend the others.
-fn wanting(mesh: &Mixed, faults: &[Fault], tolerance: f64) -> Vec<(DVec3, f64, f64)> {
-    let sound = |fault: &&Fault| mesh.quality(fault.face) > USEFUL;
-    smaller(mesh, faults.iter().filter(sound), tolerance)
-}
-
-/// From triangles to clean quads.
-fn advance_and_clean(
-    mesh: &mut Mixed,
-    ground: &Ground<'_>,
-    params: &QMorphParams,
-    rules: Rules,
-    stats: &mut QMorphStats,
-    watch: &Watch,
-) -> Result<(), Cancelled> {
-    if params.all_quad {
-        stats.parity_splits = pair_up(mesh, ground, rules);
-    }
-    polish(mesh, ground, rules, 4);
-    watch.phase("advancing the front", None);
-    stats.seams = advance(mesh, ground, watch)?.seams;
-    let after_front = triangles_by_region(mesh, stats.regions);
-    join_neighbours(mesh);
-    let after_pairs = triangles_by_region(mesh, stats.regions);
-    join_along_paths(mesh, ground);
-    stats.regions_by_level = [0; 4];
-    for (front, pairs) in after_front.iter().zip(&after_pairs) {
-        let level = if *front <= 1 { 0 } else { 1 + usize::from(*pairs > 1) };
-        stats.regions_by_level[level] += 1;
-    }
-    watch.phase("cleaning up", None);
-    stats.clean_edits = clean(mesh, ground, rules.curve_tolerance, watch)?.edits;
-    Ok(())
-}
-
-fn triangles_by_region(mesh: &Mixed, regions: usize) -> Vec<usize> {
-    let mut count = vec![0; regions];
-    for f in mesh.faces().filter(|&f| mesh.is_triangle(f)) {
-        count[mesh.region(f) as usize] += 1;
-    }
-    count
-}
-
 /// Recounts the result.
 fn judge(mesh: &Mixed, stats: &mut QMorphStats) {
     (stats.triangles, stats.quads) = mesh.census();
@@ -455,7 +285,7 @@ pub struct Step;
 
 impl StepContract for Step {
     const NAME: &'static str = "q-morph";
-    const REVISION: u32 = 7;
+    const REVISION: u32 = 8;
     const INPUTS: &'static [InputDef] = &[InputDef {
         name: "from",
         accepts: &[Port::Surface],

@@ -20,29 +20,36 @@ const CALM: f64 = 0.8;
 /// Points of the surface looked at round a vertex.
 const POINTS: usize = 64;
 
-/// Moves vertices at faults until there is none, or no move helps. Returns what is left.
+/// Moves vertices at faults in regions that are `awake` until there is none, or no move helps. Returns what is left.
 pub(super) fn settle(
     mesh: &mut Mixed,
     ground: &Ground<'_>,
     check: &Check,
     tolerance: f64,
+    awake: &[bool],
     watch: &Watch,
 ) -> Result<Vec<Fault>, Cancelled> {
-    let mut faults = check.beyond(mesh, tolerance, watch)?;
+    let mut faults = check.beyond(mesh, tolerance, awake, watch)?;
     for _ in 0..CHECKS {
         let mut work = Settler { mesh, ground, check, tolerance };
-        let mut moved = 0;
+        let mut moved = vec![false; awake.len()];
         for _ in 0..ROUNDS {
-            let now = faults.iter().filter(|fault| work.mend(fault)).count();
-            moved += now;
-            if now == 0 {
+            let mut helped = false;
+            for fault in &faults {
+                if work.mend(fault) {
+                    moved[work.mesh.region(fault.face) as usize] = true;
+                    helped = true;
+                }
+            }
+            if !helped {
                 break;
             }
         }
-        if moved == 0 {
+        if !moved.contains(&true) {
             break;
         }
-        faults = check.beyond(mesh, tolerance, watch)?;
+        faults.retain(|fault| !moved[mesh.region(fault.face) as usize]);
+        faults.extend(check.beyond(mesh, tolerance, &moved, watch)?);
     }
     Ok(faults)
 }
@@ -78,7 +85,7 @@ impl Settler<'_, '_> {
         let axis = if normal == DVec3::ZERO { DVec3::Z } else { normal };
         let x = axis.any_orthonormal_vector();
         let y = axis.cross(x);
-        let mut best = (0.98 * self.excess(v, &points), start, normal);
+        let mut best = (0.98 * self.excess(v, &points, f64::INFINITY), start, normal);
         let before = best.0;
         if before <= 0.0 {
             return false;
@@ -99,7 +106,7 @@ impl Settler<'_, '_> {
             }
             self.mesh.set_point(v, foot.point, foot.normal);
             if self.mesh.star_quality(v) >= least - 1e-12 {
-                let excess = self.excess(v, &points);
+                let excess = self.excess(v, &points, best.0);
                 if excess < best.0 {
                     best = (excess, foot.point, foot.normal);
                 }
@@ -141,19 +148,30 @@ impl Settler<'_, '_> {
         out
     }
 
-    /// The sum of squares of what distances exceed the calm part of the tolerance by, both ways, at samples.
-    fn excess(&self, v: u32, points: &[DVec3]) -> f64 {
+    /// The sum of squares of what distances exceed the calm part of the tolerance by, both ways, at samples; once it is at
+    /// least `bound`, anything above.
+    fn excess(&self, v: u32, points: &[DVec3], bound: f64) -> f64 {
         let triangles = self.triangles_at(v);
         let calm = CALM * self.tolerance;
         let over = |squared: f64| (squared.sqrt() - calm).max(0.0).powi(2);
+        let nearest = |p| self.check.surface.bvh().near(p, f64::INFINITY, calm * calm);
         let mut sum = 0.0;
+        for &p in points {
+            sum += over(distance_squared(p, &triangles));
+            if sum >= bound {
+                return sum;
+            }
+        }
         for t in &triangles {
             for [a, b, c] in SAMPLES {
                 let p = a * t[0] + b * t[1] + c * t[2];
-                sum += self.check.surface.bvh().closest(p).map_or(0.0, |c| over(c.nearest.distance_squared));
+                sum += nearest(p).map_or(0.0, |c| over(c.nearest.distance_squared));
+            }
+            if sum >= bound {
+                return sum;
             }
         }
-        sum + points.iter().map(|&p| over(distance_squared(p, &triangles))).sum::<f64>()
+        sum
     }
 }
 

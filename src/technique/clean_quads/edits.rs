@@ -40,21 +40,21 @@ impl Cleaner<'_, '_> {
         }
         kinds.sort_by(|x, y| y.0.total_cmp(&x.0).then(x.1.cmp(&y.1)));
         if !self.is_rescue {
-            return kinds.into_iter().take(8).any(|(_, _, kind)| self.attempt(kind, true).is_some());
+            return kinds.into_iter().take(8).any(|(gain, _, kind)| self.attempt(kind, gain, true).is_some());
         }
         // The one that leaves the best shapes.
-        let mut best: Option<(f64, Kind)> = None;
-        for (_, _, kind) in kinds.into_iter().take(24) {
-            if let Some(quality) = self.attempt(kind, false)
-                && best.is_none_or(|(most, _)| quality > most)
+        let mut best: Option<(f64, f64, Kind)> = None;
+        for (gain, _, kind) in kinds.into_iter().take(24) {
+            if let Some(quality) = self.attempt(kind, gain, false)
+                && best.is_none_or(|(most, ..)| quality > most)
             {
-                best = Some((quality, kind));
+                best = Some((quality, gain, kind));
                 if quality > super::POOR {
                     break;
                 }
             }
         }
-        best.is_some_and(|(_, kind)| self.attempt(kind, true).is_some())
+        best.is_some_and(|(_, gain, kind)| self.attempt(kind, gain, true).is_some())
     }
 
     fn kinds(&self, v: u32) -> Vec<Kind> {
@@ -299,7 +299,7 @@ impl Cleaner<'_, '_> {
     }
 
     /// Does an edit, smooths, and keeps it if it gained and is to be kept. The least quality it came to if it gained.
-    fn attempt(&mut self, kind: Kind, keep: bool) -> Option<f64> {
+    fn attempt(&mut self, kind: Kind, gain: f64, keep: bool) -> Option<f64> {
         self.mesh.begin();
         let Some(edit) = self.edit(kind) else {
             self.mesh.rollback();
@@ -307,6 +307,11 @@ impl Cleaner<'_, '_> {
         };
         let ring = self.corners_of(&edit.old);
         let before = self.judge(&ring);
+        if !self.is_rescue && gain < 1e-9 && before.1 >= GOOD {
+            // It could only win by shapes, and those are good.
+            self.mesh.rollback();
+            return None;
+        }
         if self.mesh.replace(&edit.old, &edit.new, edit.moved).is_none() {
             self.mesh.rollback();
             return None;
@@ -316,6 +321,11 @@ impl Cleaner<'_, '_> {
         touched.sort_unstable();
         touched.dedup();
         if !touched.iter().all(|&v| self.mesh.is_proper(v, 3)) {
+            self.mesh.rollback();
+            return None;
+        }
+        if !self.is_rescue && self.misfits(&touched) >= before.0 + 1e-9 {
+            // Smoothing will not change that.
             self.mesh.rollback();
             return None;
         }
@@ -336,6 +346,7 @@ impl Cleaner<'_, '_> {
         let gained = (!self.is_rescue && ((fewer && good) || better)) || rescued;
         if gained && keep {
             self.mesh.commit();
+            self.note_change(&touched);
         } else {
             self.mesh.rollback();
         }
@@ -344,12 +355,15 @@ impl Cleaner<'_, '_> {
 
     /// The sum of misfits and the least quality at these vertices.
     fn judge(&self, vertices: &[u32]) -> (f64, f64) {
-        let mut sum = (0.0, f64::INFINITY);
-        for &v in vertices {
-            sum.0 += self.misfit(v);
-            sum.1 = f64::min(sum.1, self.sound_quality(v));
-        }
-        sum
+        let mut faces: SmallVec<[u32; 64]> = vertices.iter().flat_map(|&v| self.mesh.faces_at(v)).collect();
+        faces.sort_unstable();
+        faces.dedup();
+        let least = faces.into_iter().map(|f| self.sound_quality(f)).fold(f64::INFINITY, f64::min);
+        (self.misfits(vertices), least)
+    }
+
+    fn misfits(&self, vertices: &[u32]) -> f64 {
+        vertices.iter().map(|&v| self.misfit(v)).sum()
     }
 
     fn corners_of(&self, faces: &[u32]) -> Vec<u32> {
@@ -376,6 +390,7 @@ impl Cleaner<'_, '_> {
             && [c, x, a, y].iter().all(|&w| self.mesh.is_proper(w, 2));
         if done {
             self.mesh.commit();
+            self.note_change(&[c, x, a, y]);
         } else {
             self.mesh.rollback();
         }

@@ -19,14 +19,14 @@
 //! O(vertices) a pass; passes stop when nothing gains.
 
 mod edits;
+mod memory;
 mod relax;
 mod valence;
-
-use rustc_hash::FxHashSet;
 
 use super::ground::Ground;
 use super::mixed::{Mixed, Place};
 use crate::watch::{Cancelled, Watch};
+use memory::Memory;
 
 pub use valence::{Census, census, sharpest_sector};
 
@@ -35,8 +35,6 @@ const GOOD: f64 = 0.35;
 
 /// Faces below this are worth edits that make valences worse.
 const POOR: f64 = 0.5;
-/// Faces below this are tried again and again.
-const USELESS: f64 = 0.15;
 /// Rounds of such edits.
 const RESCUES: usize = 5;
 
@@ -57,47 +55,64 @@ struct Cleaner<'a, 'g> {
     curve_tolerance: f64,
     /// Whether shape counts more than valences.
     is_rescue: bool,
+    /// Whether each region takes part.
+    awake: &'a [bool],
+    memory: Memory,
+}
+
+impl<'a, 'g> Cleaner<'a, 'g> {
+    fn new(mesh: &'a mut Mixed, ground: &'a Ground<'g>, curve_tolerance: f64, awake: &'a [bool]) -> Self {
+        Self { mesh, ground, curve_tolerance, is_rescue: false, awake, memory: Memory::default() }
+    }
 }
 
 /// Cleans the topology and smooths; [`finish`] goes on. Vertices slide along curves within
-/// `curve_tolerance` of them.
+/// `curve_tolerance` of them. Only regions that are `awake` take part.
 pub fn clean(
     mesh: &mut Mixed,
     ground: &Ground<'_>,
     curve_tolerance: f64,
+    awake: &[bool],
     watch: &Watch,
 ) -> Result<CleanReport, Cancelled> {
-    let mut cleaner = Cleaner { mesh, ground, curve_tolerance, is_rescue: false };
+    let mut cleaner = Cleaner::new(mesh, ground, curve_tolerance, awake);
     let mut report = CleanReport::default();
     cleaner.relax_all(2);
     for pass in 0..8 {
         watch.check()?;
+        if pass == 2 {
+            // From here on shapes count too.
+            cleaner.memory = Memory::default();
+        }
         let edits = cleaner.pass(pass >= 2);
         report.edits += edits;
-        cleaner.relax_all(2);
+        if pass == 0 {
+            cleaner.relax_all(2);
+        }
         if edits == 0 {
             break;
         }
     }
     cleaner.mesh.compact();
-    let mut cleaner = Cleaner { mesh, ground, curve_tolerance, is_rescue: false };
+    let mut cleaner = Cleaner::new(mesh, ground, curve_tolerance, awake);
     cleaner.relax_all(6);
     Ok(report)
 }
 
-/// Optimises the shapes of clean quads to the end, and mends poor ones at the price of regular vertices.
+/// Optimises the shapes of clean quads to the end, and mends poor ones at the price of regular vertices, in the regions
+/// that are `awake`.
 pub fn finish(
     mesh: &mut Mixed,
     ground: &Ground<'_>,
     curve_tolerance: f64,
+    awake: &[bool],
     watch: &Watch,
 ) -> Result<CleanReport, Cancelled> {
-    let mut cleaner = Cleaner { mesh, ground, curve_tolerance, is_rescue: false };
+    let mut cleaner = Cleaner::new(mesh, ground, curve_tolerance, awake);
     let mut report = CleanReport { edits: 0, rounds: cleaner.optimise(12, watch)? };
     cleaner.is_rescue = true;
-    let mut tried = FxHashSet::default();
     for _ in 0..RESCUES {
-        let rescued = cleaner.rescue(&mut tried);
+        let rescued = cleaner.rescue();
         if rescued == 0 {
             break;
         }
@@ -112,7 +127,7 @@ impl Cleaner<'_, '_> {
     fn pass(&mut self, thorough: bool) -> usize {
         let mut edits = 0;
         for v in 0..self.mesh.vertex_slots() {
-            if !self.mesh.is_vertex(v) {
+            if !self.mesh.is_vertex(v) || self.memory.is_hopeless(v) || !self.is_awake(v) {
                 continue;
             }
             if self.mesh.place(v).is_free() && self.mesh.valence(v) == 2 {
@@ -127,15 +142,18 @@ impl Cleaner<'_, '_> {
     /// Applies the best edits at an irregular vertex until none gains.
     fn improve(&mut self, v: u32) -> usize {
         let mut edits = 0;
-        while self.mesh.is_vertex(v) && edits < 4 && self.best_edit(v) {
+        while self.mesh.is_vertex(v) && edits < 4 {
+            if !self.best_edit(v) {
+                self.memory.note_refusal(v);
+                break;
+            }
             edits += 1;
         }
         edits
     }
 
-    /// Edits at the corners of poor faces, the worst first; faces that were tried in vain are left alone. Returns the
-    /// number of edits.
-    fn rescue(&mut self, tried: &mut FxHashSet<u32>) -> usize {
+    /// Edits at the corners of poor faces, the worst first. Returns the number of edits.
+    fn rescue(&mut self) -> usize {
         let quality = |f: u32| (self.mesh.quality(f), f);
         let mut poor: Vec<(f64, u32)> = self.mesh.faces().map(quality).filter(|&(q, _)| q < POOR).collect();
         poor.sort_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
@@ -144,18 +162,26 @@ impl Cleaner<'_, '_> {
             if !self.mesh.is_face(f) || self.mesh.is_triangle(f) || self.mesh.quality(f) >= POOR {
                 continue;
             }
-            // What is of no use is always worth another look: its neighbours may be others by now.
-            if !tried.insert(f) && self.mesh.quality(f) > USELESS {
-                continue;
-            }
             for v in self.mesh.corners(f) {
-                if self.mesh.is_vertex(v) && self.best_edit(v) {
+                if !self.mesh.is_vertex(v) || self.memory.is_hopeless(v) || !self.is_awake(v) {
+                    continue;
+                }
+                if self.best_edit(v) {
                     edits += 1;
                     break;
                 }
+                self.memory.note_refusal(v);
             }
         }
         edits
+    }
+
+    /// Whether a vertex takes part: it is in a region that does, or on its border.
+    fn is_awake(&self, v: u32) -> bool {
+        match self.mesh.place(v) {
+            Place::Region(region) => self.awake[region as usize],
+            _ => self.mesh.faces_at(v).any(|f| self.awake[self.mesh.region(f) as usize]),
+        }
     }
 
     /// Whether a vertex may be moved or removed freely.

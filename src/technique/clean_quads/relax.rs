@@ -4,35 +4,67 @@ use glam::DVec3;
 use smallvec::SmallVec;
 
 use super::Cleaner;
-use crate::technique::mixed::{Place, quad_quality, triangle_quality};
+use crate::technique::mixed::{NONE, Place, triangle_quality};
 use crate::watch::{Cancelled, Watch};
 
 /// Vertices whose faces cost less each are not worth a search.
 const FINE: f64 = 5e-4;
 
-/// The other corners of the faces at a vertex, and which corner the vertex is: what a move changes.
+/// The other corners of a face at a vertex, counter-clockwise, and what of its shape a move of the vertex leaves.
+struct Corner {
+    next: DVec3,
+    before: DVec3,
+    across: DVec3,
+    /// The sides away from the vertex, of unit length.
+    far: [DVec3; 2],
+    /// The vector product of these.
+    bend: DVec3,
+    is_quad: bool,
+}
+
+impl Corner {
+    fn new(next: DVec3, across: DVec3, before: DVec3, is_quad: bool) -> Self {
+        let far = [(across - next).normalize_or_zero(), (before - across).normalize_or_zero()];
+        Self { next, before, across, far, bend: far[0].cross(far[1]), is_quad }
+    }
+
+    /// The quality of the face with the vertex at `p`, and the cosine of its normal with `normal`.
+    fn judge(&self, p: DVec3, normal: DVec3) -> (f64, f64) {
+        if !self.is_quad {
+            return (triangle_quality([p, self.next, self.before]), 1.0);
+        }
+        let face = (self.across - p).cross(self.before - self.next);
+        let length = face.length();
+        if length <= 0.0 {
+            return (0.0, 0.0);
+        }
+        let out = (self.next - p).normalize_or_zero();
+        let back = (p - self.before).normalize_or_zero();
+        let near = face.dot(back.cross(out)).min(face.dot(out.cross(self.far[0])));
+        let least = near.min(face.dot(self.far[1].cross(back))).min(face.dot(self.bend));
+        (least / length, face.dot(normal) / length)
+    }
+}
+
+/// The faces at a vertex: what a move changes.
 struct Star {
-    faces: SmallVec<[([DVec3; 4], u8, u8); 8]>,
+    faces: SmallVec<[Corner; 8]>,
     normal: DVec3,
 }
 
 impl Star {
     /// The cost of the faces with the vertex at `p`: 0 where all are squares; steep below useful shapes.
     fn cost(&self, p: DVec3) -> f64 {
+        let has_side = self.normal != DVec3::ZERO;
         let mut sum = 0.0;
-        for &(mut corners, at, n) in &self.faces {
-            corners[at as usize] = p;
-            let q = if n == 4 { quad_quality(corners) } else { triangle_quality([corners[0], corners[1], corners[2]]) };
+        for face in &self.faces {
+            let (q, cosine) = face.judge(p, self.normal);
             let lack = 1.0 - q;
             let poor = (0.7 - q).max(0.0);
             let bad = (0.3 - q).max(0.0);
             sum += lack * lack + 8.0 * poor * poor + 60.0 * bad * bad;
-            if self.normal != DVec3::ZERO {
-                let last = if n == 4 { corners[3] } else { corners[2] };
-                let face = (corners[2] - corners[0]).cross(last - corners[1]);
-                if n == 4 && face.dot(self.normal) < 0.2 * face.length() {
-                    sum += 20.0;
-                }
+            if has_side && cosine < 0.2 {
+                sum += 20.0;
             }
         }
         sum
@@ -42,36 +74,29 @@ impl Star {
 impl Cleaner<'_, '_> {
     fn star(&self, v: u32, normal: DVec3) -> Star {
         let mut star = Star { faces: SmallVec::new(), normal };
-        for f in self.mesh.faces_at(v) {
-            let corners = self.mesh.corners(f);
-            let mut points = [DVec3::ZERO; 4];
-            let mut at = 0;
-            for (i, &w) in corners.iter().enumerate() {
-                points[i] = self.mesh.point(w);
-                if w == v {
-                    at = i as u8;
-                }
+        for h in self.mesh.star(v) {
+            let f = self.mesh.face(h);
+            if f != NONE {
+                let next = self.mesh.next(h);
+                let corners = [next, self.mesh.next(next), self.mesh.prev(h)];
+                let [a, b, c] = corners.map(|k| self.mesh.point(self.mesh.origin(k)));
+                star.faces.push(Corner::new(a, b, c, !self.mesh.is_triangle(f)));
             }
-            star.faces.push((points, at, corners.len() as u8));
         }
         star
     }
 
-    /// The least quality at a vertex; a face turned against the surface counts as inverted.
-    pub(super) fn sound_quality(&self, v: u32) -> f64 {
-        let mut least = f64::INFINITY;
-        for f in self.mesh.faces_at(v) {
-            let mut reference = DVec3::ZERO;
-            for h in self.mesh.sides(f) {
-                let w = self.mesh.origin(h);
-                if self.mesh.place(w).is_free() {
-                    reference += self.mesh.normal(w);
-                }
+    /// The quality of a face; one that is turned against the surface counts as inverted.
+    pub(super) fn sound_quality(&self, f: u32) -> f64 {
+        let mut reference = DVec3::ZERO;
+        for h in self.mesh.sides(f) {
+            let w = self.mesh.origin(h);
+            if self.mesh.place(w).is_free() {
+                reference += self.mesh.normal(w);
             }
-            let turned = self.mesh.face_normal(f).dot(reference.normalize_or_zero()) < 0.2 && reference != DVec3::ZERO;
-            least = least.min(if turned { -1.0 } else { self.mesh.quality(f) });
         }
-        least
+        let turned = reference != DVec3::ZERO && self.mesh.face_normal(f).dot(reference.normalize_or_zero()) < 0.2;
+        if turned { -1.0 } else { self.mesh.quality(f) }
     }
 
     /// Whether a normal is one of the same side of the body as the vertex is on.
@@ -121,38 +146,41 @@ impl Cleaner<'_, '_> {
     pub(super) fn search_at(&mut self, vertices: &[u32]) {
         for _ in 0..2 {
             for &v in vertices {
-                self.better_place(v);
+                self.better_place(v, 0.12);
             }
         }
     }
 
-    /// Whether a vertex found a better place.
-    fn better_place(&mut self, v: u32) -> bool {
+    /// Whether a vertex found a better place; the first steps are this part of the edges there.
+    fn better_place(&mut self, v: u32, first: f64) -> bool {
         match self.mesh.place(v) {
             Place::Node => false,
             Place::Arc { arc, at } => self.slide(v, arc, at),
-            Place::Region(region) => self.search(v, region),
+            Place::Region(region) => self.search(v, region, first),
         }
     }
 
-    /// Smoothing of all vertices.
+    /// Smoothing of all vertices that take part.
     pub(super) fn relax_all(&mut self, rounds: usize) {
-        let all: Vec<u32> = self.mesh.vertices().collect();
+        let all: Vec<u32> = self.mesh.vertices().filter(|&v| self.is_awake(v)).collect();
         self.relax(&all, rounds);
     }
 
     /// Moves every vertex where its faces are better, until the moves are small. Returns the rounds.
     pub(super) fn optimise(&mut self, rounds: usize, watch: &Watch) -> Result<usize, Cancelled> {
         let all: Vec<u32> = self.mesh.vertices().collect();
-        let mut active: Vec<bool> = vec![true; self.mesh.vertex_slots() as usize];
+        let mut active: Vec<bool> =
+            (0..self.mesh.vertex_slots()).map(|v| self.mesh.is_vertex(v) && self.is_awake(v)).collect();
+        let awake = active.iter().filter(|&&is| is).count();
         for round in 0..rounds {
+            let first = if round < 2 { 0.12 } else { 0.05 };
             watch.check()?;
             let mut moved = 0;
             for &v in &all {
                 if !std::mem::replace(&mut active[v as usize], false) {
                     continue;
                 }
-                if self.better_place(v) {
+                if self.better_place(v, first) {
                     moved += 1;
                     active[v as usize] = true;
                     for f in self.mesh.faces_at(v) {
@@ -162,7 +190,7 @@ impl Cleaner<'_, '_> {
                     }
                 }
             }
-            if moved * 200 < all.len() {
+            if moved * 200 < awake {
                 return Ok(round + 1);
             }
         }
@@ -180,7 +208,7 @@ impl Cleaner<'_, '_> {
     }
 
     /// A pattern search in the tangent plane, back onto the region.
-    fn search(&mut self, v: u32, region: u32) -> bool {
+    fn search(&mut self, v: u32, region: u32, first_step: f64) -> bool {
         let normal = self.mesh.normal(v);
         let star = self.star(v, normal);
         let start = self.mesh.point(v);
@@ -193,7 +221,7 @@ impl Cleaner<'_, '_> {
         let y = axis.cross(x);
         let (mut best, mut cost) = (start, first);
         let reach = self.reach(v);
-        let mut step = 0.12 * reach;
+        let mut step = first_step * reach;
         while step > 0.01 * reach {
             let before = cost;
             for (a, b) in [(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)] {

@@ -42,15 +42,27 @@ pub fn curve_distance(mesh: &Mixed, ground: &Ground<'_>) -> f64 {
 }
 
 impl Remesher<'_, '_> {
-    /// Samples every curve and makes its vertices those of the samples.
-    pub(super) fn resample_curves(&mut self) {
+    /// Samples the curves and makes their vertices those of the samples; where the sizes `before` are given, only those
+    /// with a vertex whose size is another now. Returns which.
+    pub(super) fn resample_curves(&mut self, before: &[f64]) -> Vec<bool> {
         self.surplus = vec![false; self.mesh.vertex_slots() as usize];
         let mut chains = chains(self.mesh, self.ground);
-        let mut places: Vec<Vec<f64>> = (0..chains.len()).map(|arc| self.samples(arc, &chains[arc], 1)).collect();
+        let changed = |&(_, v): &(f64, u32)| self.is_changed(v, before);
+        let touched: Vec<bool> = chains.iter().map(|chain| chain.iter().any(changed)).collect();
+        let place = |arc: usize| match touched[arc] {
+            true => self.samples_alike(arc, &chains[arc], before),
+            false => chains[arc].iter().map(|&(at, _)| at).collect(),
+        };
+        let mut places: Vec<Vec<f64>> = (0..chains.len()).map(place).collect();
         for arc in self.cramped(&places) {
-            places[arc] = self.samples(arc, &chains[arc], 2);
+            if touched[arc] {
+                places[arc] = self.samples(arc, &chains[arc], 2);
+            }
         }
         for (arc, chain) in chains.iter_mut().enumerate() {
+            if !touched[arc] {
+                continue;
+            }
             if places[arc].len() == 2 && chain.len() > 1 {
                 // A curve shorter than the size: its ends need smaller faces, or nothing between them could move.
                 let length = self.ground.curves[arc].length();
@@ -63,6 +75,21 @@ impl Remesher<'_, '_> {
                 self.fit_curve(arc as u32, chain, &places[arc]);
             }
         }
+        touched
+    }
+
+    /// Where the vertices of a curve should be. Where sizes are lowered, an even number of pieces more, so that no region
+    /// far away has to change for it.
+    fn samples_alike(&self, arc: usize, chain: &[(f64, u32)], before: &[f64]) -> Vec<f64> {
+        let mut places = self.samples(arc, chain, 1);
+        if !before.is_empty() && places.len() % 2 != chain.len() % 2 {
+            let length = |i: usize| places[i] - places[i - 1];
+            let longest = (1..places.len()).max_by(|&i, &j| length(i).total_cmp(&length(j)));
+            if let Some(i) = longest {
+                places.insert(i, 0.5 * (places[i - 1] + places[i]));
+            }
+        }
+        places
     }
 
     /// Where the vertices of a curve should be, with at least so many pieces.
@@ -161,10 +188,11 @@ impl Remesher<'_, '_> {
         }
     }
 
-    /// Spreads the vertices of each curve evenly by the sizes there.
-    pub(super) fn even_curves(&mut self) {
+    /// Spreads the vertices of each curve evenly by the sizes there, where both regions beside it are awake.
+    pub(super) fn even_curves(&mut self, awake: &[bool]) {
         for (arc, chain) in chains(self.mesh, self.ground).into_iter().enumerate() {
-            if chain.len() < 3 {
+            let sleeps = |&region: &u32| region != NONE && !awake[region as usize];
+            if chain.len() < 3 || self.ground.beside[arc].iter().any(sleeps) {
                 continue;
             }
             let curve = &self.ground.curves[arc];

@@ -51,12 +51,17 @@ pub struct Rules {
 
 /// How often sizes are lowered where they prove too large.
 const ADAPTATIONS: usize = 4;
-/// Rounds of edits between two such measurements.
+/// Most rounds of edits between two such measurements.
 const ROUNDS: usize = 5;
+/// Rounds end where fewer than one edge in so many collapses.
+const QUIET: usize = 1000;
 /// Passes of collapses in a round; all but the first look only next to what the one before did.
 const COLLAPSES: usize = 24;
 /// The same for flips.
 const FLIPS: usize = 12;
+
+/// Sizes that are lowered by less than this do not count as changed: grading lowers many a little.
+const CHANGE: f64 = 0.97;
 
 /// The remesher at work.
 struct Remesher<'a, 'g> {
@@ -96,10 +101,12 @@ pub fn tighten(
     Remesher { surplus: Vec::new(), asleep: Vec::new(), mesh, ground, rules }.adapt(0, &before, watch)
 }
 
-/// Rounds of flips and smoothing only, curve vertices evenly spread.
-pub fn polish(mesh: &mut Mixed, ground: &Ground<'_>, rules: Rules, rounds: usize) {
-    let mut work = Remesher { surplus: Vec::new(), asleep: Vec::new(), mesh, ground, rules };
-    work.even_curves();
+/// Rounds of flips and smoothing only, curve vertices evenly spread, in regions that are `awake`.
+pub fn polish(mesh: &mut Mixed, ground: &Ground<'_>, rules: Rules, rounds: usize, awake: &[bool]) {
+    let sleeps = |v| mesh.faces_at(v).any(|f| !awake[mesh.region(f) as usize]);
+    let asleep = (0..mesh.vertex_slots()).map(|v| mesh.is_vertex(v) && sleeps(v)).collect();
+    let mut work = Remesher { surplus: Vec::new(), asleep, mesh, ground, rules };
+    work.even_curves(awake);
     for _ in 0..rounds {
         work.flip();
         work.smooth();
@@ -107,6 +114,7 @@ pub fn polish(mesh: &mut Mixed, ground: &Ground<'_>, rules: Rules, rounds: usize
     // From here on every free vertex knows its side of the body.
     for v in 0..work.mesh.vertex_slots() {
         if work.mesh.is_vertex(v)
+            && !work.is_asleep(v)
             && let Place::Region(region) = work.mesh.place(v)
         {
             let foot = ground.project_from(region, work.mesh.point(v), work.mesh.point(v));
@@ -120,9 +128,9 @@ impl Remesher<'_, '_> {
     /// near those that are others now.
     fn adapt(&mut self, times: usize, before: &[f64], watch: &Watch) -> Result<(), Cancelled> {
         self.grade();
-        self.resample_curves();
+        let touched = self.resample_curves(before);
         self.grade();
-        self.send_to_sleep(before);
+        self.send_to_sleep(before, &touched);
         for adaptation in 0..=times {
             for round in 0..ROUNDS {
                 watch.check()?;
@@ -130,7 +138,7 @@ impl Remesher<'_, '_> {
                 let collapsed = self.collapse_short();
                 self.flip();
                 self.smooth();
-                if adaptation > 0 && round >= 2 && collapsed == 0 {
+                if round >= 2 && collapsed <= self.mesh.edges().count() / QUIET {
                     break;
                 }
             }
@@ -142,17 +150,19 @@ impl Remesher<'_, '_> {
                 break;
             }
             self.grade();
-            self.resample_curves();
+            self.resample_curves(&[]);
             self.grade();
         }
         Ok(())
     }
 
-    /// Lets only those vertices take part whose size is another than before, or a neighbour's.
-    fn send_to_sleep(&mut self, before: &[f64]) {
+    /// Lets only those vertices take part whose size is another than before, or a neighbour's, and those of curves that
+    /// were touched.
+    fn send_to_sleep(&mut self, before: &[f64], touched: &[bool]) {
         self.asleep = vec![true; before.len()];
         for v in self.mesh.vertices() {
-            if before.get(v as usize) != Some(&self.mesh.size(v)) {
+            let is_touched = matches!(self.mesh.place(v), Place::Arc { arc, .. } if touched[arc as usize]);
+            if is_touched || self.is_changed(v, before) {
                 for w in std::iter::once(v).chain(self.mesh.neighbours(v)) {
                     if let Some(asleep) = self.asleep.get_mut(w as usize) {
                         *asleep = false;
@@ -164,6 +174,16 @@ impl Remesher<'_, '_> {
 
     fn is_asleep(&self, v: u32) -> bool {
         self.asleep.get(v as usize).copied().unwrap_or(false)
+    }
+
+    /// Whether a vertex is new or its size much less than before.
+    fn is_changed(&self, v: u32, before: &[f64]) -> bool {
+        before.get(v as usize).is_none_or(|size| self.mesh.size(v) < CHANGE * size)
+    }
+
+    /// Whether both ends of an edge are asleep.
+    fn sleeps(&self, h: u32) -> bool {
+        self.is_asleep(self.mesh.origin(h)) && self.is_asleep(self.mesh.target(h))
     }
 
     fn size_of(&self, h: u32) -> f64 {
@@ -192,6 +212,9 @@ impl Remesher<'_, '_> {
         for _ in 0..12 {
             let mut long: Vec<(f64, u32)> = Vec::new();
             for h in self.mesh.edges() {
+                if self.sleeps(h) {
+                    continue;
+                }
                 let length = self.mesh.length(h);
                 if length > 4.0 / 3.0 * self.size_of(h) && self.is_inner(h) {
                     long.push((length, h));
@@ -241,7 +264,7 @@ impl Remesher<'_, '_> {
 
     fn collapse_short(&mut self) -> usize {
         let mut collapsed = 0;
-        let mut waiting: Vec<u32> = self.mesh.edges().collect();
+        let mut waiting: Vec<u32> = self.mesh.edges().filter(|&h| !self.sleeps(h)).collect();
         for _ in 0..COLLAPSES {
             let mut kept = Vec::new();
             for h in waiting {
@@ -285,8 +308,7 @@ impl Remesher<'_, '_> {
     }
 
     fn flip(&mut self) {
-        let awake = |h: &u32| !self.is_asleep(self.mesh.origin(*h)) || !self.is_asleep(self.mesh.target(*h));
-        self.flip_from(self.mesh.edges().filter(awake).collect());
+        self.flip_from(self.mesh.edges().filter(|&h| !self.sleeps(h)).collect());
     }
 
     /// Flips these edges where that makes triangles better, and then what lies next to the flips.

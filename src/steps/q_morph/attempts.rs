@@ -1,0 +1,249 @@
+//! From the surface to clean quads, tried again with smaller sizes where distance or shapes are not good enough.
+//!
+//! Every attempt starts from the best one so far and makes only those regions anew whose triangles changed. Where one
+//! makes a region worse, that region is left alone from then on.
+
+use glam::DVec3;
+
+use super::check::{Check, Fault, mean_side, smaller};
+use super::reuse::{Attempt, signs, take_over};
+use super::settle::settle;
+use super::{QMorphError, QMorphParams, QMorphStats, sizes};
+use crate::technique::clean_quads::{clean, finish, sharpest_sector};
+use crate::technique::front::advance;
+use crate::technique::ground::Ground;
+use crate::technique::isotropic::{Rules, pair_up, polish, remesh, tighten};
+use crate::technique::join::{join_along_paths, join_neighbours};
+use crate::technique::mixed::Mixed;
+use crate::watch::{Cancelled, Watch};
+
+/// How often sizes are lowered where the quads prove too far from the surface or of poor shape.
+const ATTEMPTS: usize = 6;
+/// How often sizes are lowered beforehand, where the triangles are too far from the surface.
+const PREPARATIONS: usize = 4;
+/// The part of the tolerance that triangles may use.
+const TRIANGLES: f64 = 0.7;
+/// What an attempt lacks from where faces are inverted or triangles are left.
+const BROKEN: f64 = 10.0;
+/// How much farther from their curves edges may be where that spares broken faces.
+const LOOSER: f64 = 2.0;
+/// Faces below this shape are not worth smaller ones for the sake of distance.
+const USEFUL: f64 = 0.2;
+/// Shapes above this count as good.
+const FAIR: f64 = 0.5;
+/// The sides of faces in the place of a poor one, as a part of its own.
+const ROOM: f64 = 0.7;
+
+/// One run from the surface to clean quads, with all sizes times `scale`.
+pub(super) fn morph(
+    ground: &Ground<'_>,
+    params: &QMorphParams,
+    rules: Rules,
+    scale: f64,
+    watch: &Watch,
+) -> Result<(Mixed, QMorphStats), QMorphError> {
+    let stats = QMorphStats { regions: ground.region_count(), left_out: ground.left_out, ..QMorphStats::default() };
+    let check = Check::new(ground);
+    let work = Morpher { ground, params, check: &check, scale, watch };
+    let mut best = work.attempts(rules, ATTEMPTS, &stats)?;
+    // Many pieces on a curve that is rough may be what broke it: none shorter than the least size, then a looser curve.
+    let longer = Rules { shortest: rules.least_size, ..rules };
+    let looser = Rules { curve_tolerance: LOOSER * rules.curve_tolerance, ..longer };
+    for rules in [longer, looser] {
+        if best.lack < BROKEN {
+            break;
+        }
+        let other = work.attempts(rules, ATTEMPTS, &stats)?;
+        let attempts = best.stats.attempts + other.stats.attempts;
+        if other.lack < best.lack {
+            best = other;
+        }
+        best.stats.attempts = attempts;
+    }
+    let Attempt { quads, mut stats, .. } = best;
+    stats.distance = check.distance(&quads, watch)?;
+    stats.triangles = quads.census().0;
+    Ok((quads, stats))
+}
+
+/// What all attempts share.
+struct Morpher<'a, 'g> {
+    ground: &'a Ground<'g>,
+    params: &'a QMorphParams,
+    check: &'a Check,
+    scale: f64,
+    watch: &'a Watch,
+}
+
+impl Morpher<'_, '_> {
+    /// Remeshes, and runs the front at most so many times, with smaller sizes where quads prove too far away or poor.
+    fn attempts(&self, rules: Rules, most: usize, stats: &QMorphStats) -> Result<Attempt, QMorphError> {
+        let (ground, watch) = (self.ground, self.watch);
+        let mut mesh = ground.workshop().ok_or(QMorphError::NotManifold)?;
+        sizes::set(&mut mesh, ground.surface, self.params, self.scale).map_err(QMorphError::Size)?;
+        watch.phase("remeshing between the curves", None);
+        remesh(&mut mesh, ground, rules, watch)?;
+        prepare(&mut mesh, ground, self.check, rules, watch)?;
+        let mut best = self.attempt(mesh, None, rules, stats)?.ok_or(QMorphError::Empty)?;
+        let mut rests = vec![false; stats.regions];
+        let mut attempts = 1;
+        let mut tried = Vec::new();
+        while attempts < most {
+            let places = wanting(&best, &rests, rules.tolerance);
+            if places.is_empty() || places == tried {
+                break;
+            }
+            let mut mesh = best.triangles.clone();
+            tighten(&mut mesh, ground, rules, &places, watch)?;
+            let Some(next) = self.attempt(mesh, Some(&best), rules, stats)? else { break };
+            attempts += 1;
+            for (r, rest) in rests.iter_mut().enumerate() {
+                *rest |= next.by_region[r] > best.by_region[r];
+            }
+            if next.lack < best.lack {
+                best = next;
+            }
+            tried = places;
+        }
+        best.stats.attempts = attempts;
+        Ok(best)
+    }
+
+    /// From triangles to settled quads; with what the attempt before left where nothing changed. `None` where nothing
+    /// did.
+    fn attempt(
+        &self,
+        triangles: Mixed,
+        earlier: Option<&Attempt>,
+        rules: Rules,
+        stats: &QMorphStats,
+    ) -> Result<Option<Attempt>, Cancelled> {
+        let (ground, watch) = (self.ground, self.watch);
+        let mut stats = stats.clone();
+        let mut quads = triangles.clone();
+        if self.params.all_quad {
+            stats.parity_splits = pair_up(&mut quads, ground, rules);
+        }
+        let signs = signs(&quads, stats.regions);
+        let mut awake = vec![true; stats.regions];
+        if let Some(earlier) = earlier {
+            if signs == earlier.signs {
+                return Ok(None);
+            }
+            if let Some(taken) = take_over(&quads, &signs, earlier, ground) {
+                (quads, awake) = taken;
+                let done = &earlier.stats;
+                (stats.levels, stats.seams, stats.clean_edits) = (done.levels.clone(), done.seams, done.clean_edits);
+            }
+        }
+        advance_and_clean(&mut quads, ground, rules, &awake, &mut stats, watch)?;
+        stats.clean_edits += finish(&mut quads, ground, rules.curve_tolerance, &awake, watch)?.edits;
+        let mut faults = settle(&mut quads, ground, self.check, rules.tolerance, &awake, watch)?;
+        let left = earlier.iter().flat_map(|earlier| earlier.faults_left(&awake));
+        // An edit beside a region at rest may have taken a face of it.
+        faults.extend(left.filter(|fault| fault.face < quads.face_slots() && quads.is_face(fault.face)));
+        let (lack, by_region) = lack(&quads, &faults, rules.tolerance, stats.regions);
+        Ok(Some(Attempt { triangles, signs, quads, faults, lack, by_region, stats }))
+    }
+}
+
+/// Lowers sizes where the triangles are too far from the surface: what they miss, quads miss more.
+fn prepare(mesh: &mut Mixed, ground: &Ground<'_>, check: &Check, rules: Rules, watch: &Watch) -> Result<(), Cancelled> {
+    let tolerance = TRIANGLES * rules.tolerance;
+    let mut changed = vec![true; ground.region_count()];
+    for _ in 0..PREPARATIONS {
+        let faults = check.beyond(mesh, tolerance, &changed, watch)?;
+        if faults.is_empty() {
+            break;
+        }
+        let before = signs(mesh, changed.len());
+        let places = smaller(mesh, &faults, tolerance);
+        tighten(mesh, ground, rules, &places, watch)?;
+        changed = signs(mesh, changed.len()).iter().zip(before).map(|(now, before)| *now != before).collect();
+    }
+    Ok(())
+}
+
+/// How much an attempt lacks, in all and by region: 0 where it holds to the tolerance with sound shapes.
+fn lack(mesh: &Mixed, faults: &[Fault], tolerance: f64, regions: usize) -> (f64, Vec<f64>) {
+    let fair = fair(mesh);
+    let (mut broken, mut least, mut poor) = (0.0, fair, 0.0);
+    let mut by_region = vec![0.0; regions];
+    for f in mesh.faces() {
+        let quality = mesh.quality(f);
+        let short = (fair - quality).max(0.0);
+        let wrong = 10.0 * f64::from(quality <= 0.0) + 100.0 * f64::from(mesh.is_triangle(f));
+        broken += wrong;
+        poor += short;
+        least = least.min(quality);
+        by_region[mesh.region(f) as usize] += wrong + short;
+    }
+    let (mut worst, mut farthest) = (0.0_f64, vec![0.0_f64; regions]);
+    for fault in faults {
+        let excess = fault.distance / tolerance - 1.0;
+        let far = &mut farthest[mesh.region(fault.face) as usize];
+        (worst, *far) = (worst.max(excess), far.max(excess));
+    }
+    for (lack, far) in by_region.iter_mut().zip(farthest) {
+        *lack += 4.0 * far;
+    }
+    // Many poor faces are no broken one.
+    (broken + 4.0 * worst + (fair - least) + (0.2 * poor).min(2.0), by_region)
+}
+
+/// The shape that each face could have: good, or as good as the sharpest corner allows.
+fn fair(mesh: &Mixed) -> f64 {
+    sharpest_sector(mesh).map_or(FAIR, |angle| FAIR.min(0.9 * libm::sin(angle)))
+}
+
+/// Where another attempt should have smaller faces: at faults of sound faces, and at poor faces, whose strips get more
+/// room for good ones. Not in regions at rest.
+fn wanting(attempt: &Attempt, rests: &[bool], tolerance: f64) -> Vec<(DVec3, f64, f64)> {
+    let mesh = &attempt.quads;
+    let wants = |f: u32| !rests[mesh.region(f) as usize];
+    let sound = attempt.faults.iter().filter(|fault| wants(fault.face) && mesh.quality(fault.face) > USEFUL);
+    let mut places = smaller(mesh, sound, tolerance);
+    let fair = fair(mesh);
+    for f in mesh.faces().filter(|&f| wants(f) && mesh.quality(f) < fair) {
+        let side = mean_side(mesh, f);
+        places.push((mesh.centre(f), 1.2 * side, ROOM * side));
+    }
+    places
+}
+
+/// From triangles to clean quads in the regions that are awake.
+fn advance_and_clean(
+    mesh: &mut Mixed,
+    ground: &Ground<'_>,
+    rules: Rules,
+    awake: &[bool],
+    stats: &mut QMorphStats,
+    watch: &Watch,
+) -> Result<(), Cancelled> {
+    polish(mesh, ground, rules, 4, awake);
+    watch.phase("advancing the front", None);
+    stats.seams += advance(mesh, ground, watch)?.seams;
+    let after_front = triangles_by_region(mesh, stats.regions);
+    join_neighbours(mesh);
+    let after_pairs = triangles_by_region(mesh, stats.regions);
+    join_along_paths(mesh, ground);
+    stats.levels.resize(stats.regions, 0);
+    for region in (0..stats.regions).filter(|&r| awake[r]) {
+        stats.levels[region] = if after_front[region] <= 1 { 0 } else { 1 + usize::from(after_pairs[region] > 1) };
+    }
+    stats.regions_by_level = [0; 4];
+    for &level in &stats.levels {
+        stats.regions_by_level[level] += 1;
+    }
+    watch.phase("cleaning up", None);
+    stats.clean_edits += clean(mesh, ground, rules.curve_tolerance, awake, watch)?.edits;
+    Ok(())
+}
+
+fn triangles_by_region(mesh: &Mixed, regions: usize) -> Vec<usize> {
+    let mut count = vec![0; regions];
+    for f in mesh.faces().filter(|&f| mesh.is_triangle(f)) {
+        count[mesh.region(f) as usize] += 1;
+    }
+    count
+}

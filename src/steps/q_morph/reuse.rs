@@ -1,0 +1,156 @@
+//! What one attempt takes over from the one before: the quads of all regions whose triangles are still the same.
+
+use std::hash::{Hash, Hasher};
+
+use glam::DVec3;
+use rustc_hash::{FxHashMap, FxHasher};
+
+use super::QMorphStats;
+use super::check::Fault;
+use crate::mesh::{Facet, Soup, VertexId, edge_key};
+use crate::technique::ground::Ground;
+use crate::technique::isotropic::chains;
+use crate::technique::mixed::{Mixed, NONE, Place};
+
+/// What an attempt began with and what it came to.
+pub(super) struct Attempt {
+    /// The triangles before regions were made even.
+    pub(super) triangles: Mixed,
+    /// A number for the even triangles of each region.
+    pub(super) signs: Vec<u64>,
+    /// The finished quads.
+    pub(super) quads: Mixed,
+    /// Where they are too far from the surface.
+    pub(super) faults: Vec<Fault>,
+    /// How much they lack: 0 where they hold to the tolerance with sound shapes.
+    pub(super) lack: f64,
+    /// The same by region.
+    pub(super) by_region: Vec<f64>,
+    /// What was done for them.
+    pub(super) stats: QMorphStats,
+}
+
+impl Attempt {
+    /// The faults in regions at rest, by the faces that [`take_over`] makes of theirs.
+    pub(super) fn faults_left(&self, awake: &[bool]) -> Vec<Fault> {
+        let rests = |f: u32| !awake[self.quads.region(f) as usize];
+        let mut number = vec![NONE; self.quads.face_slots() as usize];
+        for (new, f) in self.quads.faces().filter(|&f| rests(f)).enumerate() {
+            number[f as usize] = new as u32;
+        }
+        let left = self.faults.iter().filter(|fault| rests(fault.face));
+        left.map(|fault| Fault { face: number[fault.face as usize], ..*fault }).collect()
+    }
+}
+
+/// A number for the triangles of each region that is another one when they change.
+pub(super) fn signs(mesh: &Mixed, regions: usize) -> Vec<u64> {
+    let hash = |p: DVec3| {
+        let mut hasher = FxHasher::default();
+        p.to_array().map(f64::to_bits).hash(&mut hasher);
+        hasher.finish()
+    };
+    let points: Vec<u64> = (0..mesh.vertex_slots()).map(|v| hash(mesh.point(v))).collect();
+    let mut signs = vec![0_u64; regions];
+    for f in mesh.faces() {
+        // A sum over corners and faces, because neither has a first one.
+        let corners = mesh.corners(f).iter().fold(0_u64, |sum, &v| sum.wrapping_add(points[v as usize]));
+        let mut hasher = FxHasher::default();
+        corners.hash(&mut hasher);
+        let sign = &mut signs[mesh.region(f) as usize];
+        *sign = sign.wrapping_add(hasher.finish());
+    }
+    signs
+}
+
+/// The triangles of `mesh` in regions that changed, and the earlier quads in the others; and whether each region changed.
+/// `None` where nothing can be taken over.
+pub(super) fn take_over(
+    mesh: &Mixed,
+    signs: &[u64],
+    earlier: &Attempt,
+    ground: &Ground<'_>,
+) -> Option<(Mixed, Vec<bool>)> {
+    let mut awake: Vec<bool> = signs.iter().zip(&earlier.signs).map(|(now, before)| now != before).collect();
+    for f in earlier.quads.faces().filter(|&f| earlier.quads.is_triangle(f)) {
+        awake[earlier.quads.region(f) as usize] = true;
+    }
+    let same = same_vertices(mesh, &earlier.quads, ground, &mut awake);
+    if awake.iter().all(|&is| is) {
+        return None;
+    }
+    let mut glue = Glue::default();
+    let old = glue.add(&earlier.quads, |f| !awake[earlier.quads.region(f) as usize], &|_| None);
+    glue.add(mesh, |f| awake[mesh.region(f) as usize], &|v| same.get(&v).map(|&w| old[w as usize]));
+    let arcs = glue.arcs;
+    let arc = |a, b| arcs.get(&edge_key(a, b)).copied().unwrap_or(NONE);
+    let mut glued = Mixed::new(&glue.soup, glue.places, glue.regions, arc)?;
+    for (v, (normal, size)) in glue.extras.into_iter().enumerate() {
+        glued.set_point(v as u32, glued.point(v as u32), normal);
+        glued.set_size(v as u32, size);
+    }
+    Some((glued, awake))
+}
+
+/// For each vertex of `mesh` on the border of a region at rest the vertex of `quads` in its place. Regions whose curves
+/// do not fit are woken.
+fn same_vertices(mesh: &Mixed, quads: &Mixed, ground: &Ground<'_>, awake: &mut [bool]) -> FxHashMap<u32, u32> {
+    let (new, old) = (chains(mesh, ground), chains(quads, ground));
+    for (arc, sides) in ground.beside.iter().enumerate() {
+        if new[arc].len() != old[arc].len() {
+            for &region in sides.iter().filter(|&&region| region != NONE) {
+                awake[region as usize] = true;
+            }
+        }
+    }
+    let mut same = FxHashMap::default();
+    for (arc, sides) in ground.beside.iter().enumerate() {
+        if sides.iter().any(|&region| region != NONE && !awake[region as usize]) {
+            same.extend(new[arc].iter().zip(&old[arc]).map(|(&(_, v), &(_, w))| (v, w)));
+        }
+    }
+    same
+}
+
+/// A mesh put together from faces of others.
+#[derive(Default)]
+struct Glue {
+    soup: Soup,
+    places: Vec<Place>,
+    regions: Vec<u32>,
+    arcs: FxHashMap<[VertexId; 2], u32>,
+    /// Normal and size of each vertex.
+    extras: Vec<(DVec3, f64)>,
+}
+
+impl Glue {
+    /// Adds some faces of a mesh; `known` gives the vertices that are there already. Returns the number of each vertex.
+    fn add(&mut self, from: &Mixed, wanted: impl Fn(u32) -> bool, known: &dyn Fn(u32) -> Option<u32>) -> Vec<u32> {
+        let mut number = vec![NONE; from.vertex_slots() as usize];
+        for f in from.faces().filter(|&f| wanted(f)) {
+            let corners = from.corners(f);
+            for &v in &corners {
+                if number[v as usize] == NONE {
+                    number[v as usize] = known(v).unwrap_or_else(|| self.add_vertex(from, v));
+                }
+            }
+            let id = |i: usize| VertexId::from_raw(number[corners[i] as usize]);
+            self.soup.faces.push(match corners.len() {
+                3 => Facet::Tri([id(0), id(1), id(2)]),
+                _ => Facet::Quad([id(0), id(1), id(2), id(3)]),
+            });
+            self.regions.push(from.region(f));
+            for h in from.sides(f).filter(|&h| from.arc(h) != NONE) {
+                let ends = [from.origin(h), from.target(h)].map(|v| VertexId::from_raw(number[v as usize]));
+                self.arcs.insert(edge_key(ends[0], ends[1]), from.arc(h));
+            }
+        }
+        number
+    }
+
+    fn add_vertex(&mut self, from: &Mixed, v: u32) -> u32 {
+        self.places.push(from.place(v));
+        self.extras.push((from.normal(v), from.size(v)));
+        self.soup.points.push(from.point(v)).raw()
+    }
+}
