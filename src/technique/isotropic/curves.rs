@@ -49,9 +49,12 @@ impl Remesher<'_, '_> {
         let mut chains = chains(self.mesh, self.ground);
         let changed = |&(_, v): &(f64, u32)| self.is_changed(v, before);
         let touched: Vec<bool> = chains.iter().map(|chain| chain.iter().any(changed)).collect();
-        let place = |arc: usize| match touched[arc] {
-            true => self.samples_alike(arc, &chains[arc], before),
-            false => chains[arc].iter().map(|&(at, _)| at).collect(),
+        let place = |arc: usize| {
+            if touched[arc] {
+                self.samples_alike(arc, &chains[arc], before)
+            } else {
+                chains[arc].iter().map(|&(at, _)| at).collect()
+            }
         };
         let mut places: Vec<Vec<f64>> = (0..chains.len()).map(place).collect();
         for arc in self.cramped(&places) {
