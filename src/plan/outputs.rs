@@ -188,8 +188,7 @@ impl Reader<'_, '_> {
         }
         let file: PathBuf = path.components().filter(|part| *part != Component::CurDir).collect();
         self.check_folders(&file, &name, value.span);
-        let key = file.to_string_lossy().to_lowercase();
-        if let Some(earlier) = self.taken.insert(key, value.span) {
+        if let Some(earlier) = self.taken.insert(lower(&file), value.span) {
             let problem = Diagnostic::error(value.span, format!("two outputs write the file `{name}`"))
                 .note("written again here")
                 .label(earlier, "first written here")
@@ -202,11 +201,11 @@ impl Reader<'_, '_> {
 
     /// A file cannot be the folder of another one.
     fn check_folders(&mut self, file: &Path, name: &str, span: Span) {
-        let lower = |path: &Path| path.to_string_lossy().to_lowercase();
         let above = file.ancestors().skip(1).find_map(|folder| self.taken.get(&lower(folder)));
-        let below = self.taken.iter().find(|(other, _)| Path::new(other).starts_with(lower(file)));
-        let Some(earlier) = above.copied().or(below.filter(|(other, _)| **other != lower(file)).map(|(_, span)| *span))
-        else {
+        // What lies in a folder of this name sorts right behind the name with its slash.
+        let inside = format!("{}/", lower(file));
+        let below = || self.taken.range(inside.clone()..).next().filter(|(other, _)| other.starts_with(&inside));
+        let Some(earlier) = above.copied().or_else(|| below().map(|(_, span)| *span)) else {
             return;
         };
         let problem = Diagnostic::error(span, format!("`{name}` would be a file and a folder at once"))
@@ -265,4 +264,10 @@ impl Reader<'_, '_> {
         self.problem(span, format!("there is no parameter `{variable}` to put into the file name"), help);
         None
     }
+}
+
+/// A file's name as file systems that do not tell cases apart see it, with slashes everywhere.
+fn lower(file: &Path) -> String {
+    let parts: Vec<String> = file.iter().map(|part| part.to_string_lossy().to_lowercase()).collect();
+    parts.join("/")
 }

@@ -165,6 +165,12 @@ fn outputs_stay_in_their_folder_and_apart() {
     }
     let twice = RECIPE.replace("{name}-{size}.vtu", "./A/Result.inp");
     assert_eq!(messages(&twice), ["two outputs write the file `a/result.inp`"]);
+    let named = |names: &str| RECIPE.replace(r#""{name}-{size}.vtu""#, names);
+    let clash = |names: &str| messages(&named(names));
+    let within = "`X.vtu/y.vtu` would be a file and a folder at once";
+    assert_eq!(clash(r#""x.vtu", "X.vtu/y.vtu""#), [within]);
+    assert_eq!(clash(r#""X.vtu/y.vtu", "x.vtu""#), ["`x.vtu` would be a file and a folder at once"]);
+    planned(&named(r#""x.vtu-a.vtu", "x/y.vtu", "x.vtu.vtu", "x.vtu""#));
 }
 
 #[test]

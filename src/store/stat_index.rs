@@ -1,6 +1,8 @@
 //! Content hashes of files by their stat, so that an unchanged file is not hashed twice.
 //!
 //! A hash is trusted while path, size, times of modification and change (in nanoseconds), device and inode are the same.
+//! Links are followed for the stat and not for the path: to tell where each of ten thousand files really lies costs more
+//! than its stat, and a link that now leads elsewhere leads to another inode.
 //! As in Git's index, a file that was modified within two seconds before it was hashed is not trusted: it may have changed again within
 //! the resolution of the file system's clock. One small file a machine, replaced atomically; of two processes that
 //! write at once one loses its additions, which costs a hashing later and nothing else.
@@ -88,7 +90,7 @@ impl StatIndex {
 
     /// The BLAKE3 hash of the file's bytes, from the index where its stat is unchanged.
     pub fn hash(&self, path: &Path) -> io::Result<Hash> {
-        let path = fs::canonicalize(path)?;
+        let path = place(path)?;
         let stat = stat(&fs::metadata(&path)?);
         if let Some(hash) = self.lookup(&path, stat) {
             return Ok(hash);
@@ -109,7 +111,7 @@ impl StatIndex {
 
     /// The file's bytes and their hash; hashed always, since the bytes are what a step will see.
     pub fn read(&self, path: &Path) -> io::Result<(Vec<u8>, Hash)> {
-        let path = fs::canonicalize(path)?;
+        let path = place(path)?;
         let stat = stat(&fs::metadata(&path)?);
         let bytes = fs::read(&path)?;
         let hash = blake3::hash(&bytes);
@@ -167,6 +169,11 @@ impl StatIndex {
         }
         state.changed = false;
     }
+}
+
+/// Under which name a file is known. Where there are no inodes, a link is known by where it leads.
+fn place(path: &Path) -> io::Result<PathBuf> {
+    if cfg!(unix) { std::path::absolute(path) } else { fs::canonicalize(path) }
 }
 
 fn today() -> u64 {
