@@ -42,6 +42,8 @@ const CORPUS: &[&str] = &[
     "public/fandisk.obj",
     "public/joint.off",
     "public/i4_crankshaft.stl",
+    "public/i4_cylinder_head.stl",
+    "public/turbineblade.ply",
 ];
 
 /// What ships with the project, for a run without a corpus.

@@ -269,6 +269,23 @@ fn what_cannot_be_reached_is_reported_or_refused() {
 }
 
 #[test]
+fn a_mean_stretch_is_reached_or_told() {
+    let params = ControlPropertiesParams { mean_stretch: 0.88, ..tolerance(0.02) };
+    let (_, stats) = control(&sphere(4), &params);
+    assert_eq!(stats.status, Status::Satisfied);
+    assert!(stats.mean_stretch >= 0.88 && stats.faces_after < stats.faces_before / 2, "{stats:?}");
+    // A sliver has no even triangles.
+    let sliver = surface(vec![DVec3::ZERO, dvec3(10.0, 0.0, 0.0), dvec3(10.0, 0.5, 0.0)], &[[0, 1, 2]]);
+    let params = ControlPropertiesParams { mean_stretch: 0.9, min_stretch: 0.0, ..tolerance(0.01) };
+    let (_, stats) = control(&sliver, &params);
+    assert_eq!((stats.status, stats.faces_violating), (Status::Stuck, 0));
+    let strict = ControlPropertiesParams { on_infeasible: OnInfeasible::Error, ..params };
+    let input = ControlPropertiesInput { surface: &sliver, reference: &sliver, locks: LockRules::default() };
+    let refusal = control_properties(input, &strict, &Watch::silent()).expect_err("the mean is not reached");
+    assert!(refusal.to_string().starts_with("the mean stretch is 0.0"), "{refusal}");
+}
+
+#[test]
 fn equal_input_gives_equal_output() {
     let mesh = sphere(3);
     assert_eq!(control(&mesh, &tolerance(0.02)).0, control(&mesh, &tolerance(0.02)).0);

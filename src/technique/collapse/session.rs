@@ -152,6 +152,8 @@ pub struct Recount {
     pub min_stretch: f64,
     /// Mean stretch.
     pub mean_stretch: f64,
+    /// The same of the faces all whose vertices are free; `None` where there is none.
+    pub free_mean_stretch: Option<f64>,
     /// Largest size.
     pub max_size: f64,
     /// Largest valence.
@@ -172,11 +174,14 @@ impl Recount {
 /// Counts the thresholds on a surface.
 pub fn recount(surface: &Surface, freedom: &ResolvedFreedom, limits: &Limits) -> Recount {
     let mut out = Recount { min_stretch: 1.0, ..Recount::default() };
-    let mut sum = 0.0;
+    let (mut sum, mut free) = (0.0, (0.0, 0_usize));
     for f in surface.faces.ids() {
         let corners = surface.corners(f);
         let (shape, size) = (stretch(corners), triangle_size(corners));
         sum += shape;
+        if surface.faces[f].iter().all(|&v| freedom.vertices[v] == Freedom::Free) {
+            free = (free.0 + shape, free.1 + 1);
+        }
         out.min_stretch = out.min_stretch.min(shape);
         out.max_size = out.max_size.max(size);
         let centre = (corners[0] + corners[1] + corners[2]) / 3.0;
@@ -192,6 +197,7 @@ pub fn recount(surface: &Surface, freedom: &ResolvedFreedom, limits: &Limits) ->
         }
     }
     out.mean_stretch = if surface.faces.is_empty() { 0.0 } else { sum / surface.faces.len() as f64 };
+    out.free_mean_stretch = (free.1 > 0).then(|| free.0 / free.1 as f64);
     let valences = valences(surface);
     out.max_valence = valences.iter().copied().max().unwrap_or(0);
     out.over_valence = valences.iter().filter(|&&n| n > limits.max_valence).count();

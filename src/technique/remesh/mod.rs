@@ -39,6 +39,9 @@ const ROUNDS: [usize; 2] = [2, 8];
 /// Rounds of flips towards regular valences and of moves that raise the mean, at the end.
 const EVENING: usize = 4;
 
+/// Evening out that raises the mean stretch by less is not worth its time.
+const LITTLE: f64 = 1e-4;
+
 /// Coarsens to the goal, or until no edge is valid, with optimisation in between.
 ///
 /// The stretch that new faces need starts high and falls in steps, so that poor collapses are only done when a number of
@@ -58,10 +61,22 @@ pub fn coarsen(editor: &mut Editor<'_>, rules: &CollapseRules, goal: Goal, watch
     }
     touch_up(editor, BETTER.max(rules.min_stretch), rules, watch)?;
     mend_stubborn(editor, rules, watch)?;
+    regain_mean(editor, goal.mean_stretch, BETTER.max(rules.min_stretch), watch)?;
     Ok(ending)
 }
 
-/// Rounds of optimisation after the last collapses.
+/// What repairs took from the mean stretch, evened out again, as far as that goes.
+fn regain_mean(editor: &mut Editor<'_>, goal: f64, least: f64, watch: &Watch) -> Result<(), Cancelled> {
+    let mut before = 0.0;
+    while editor.mean_stretch() < goal && editor.mean_stretch() > before + LITTLE {
+        before = editor.mean_stretch();
+        even_out(editor, least, watch)?;
+    }
+    Ok(())
+}
+
+/// Rounds of optimisation after the last collapses. Faces that single edits can mend are mended before the mean is raised,
+/// and kept so, since repairs afterwards would lower it again.
 fn finish(
     editor: &mut Editor<'_>,
     rules: &CollapseRules,
@@ -69,7 +84,8 @@ fn finish(
     watch: &Watch,
 ) -> Result<(), Cancelled> {
     optimise_with(editor, ROUNDS[1], refusals, watch)?;
-    even_out(editor, GOOD.max(rules.min_stretch), watch)
+    touch_up(editor, BETTER.max(rules.min_stretch), rules, watch)?;
+    even_out(editor, BETTER.max(rules.min_stretch), watch)
 }
 
 /// Once more where faces are below the threshold still, and past it: what was done about their neighbours meanwhile, and
