@@ -130,6 +130,34 @@ fn what_is_promised_holds_when_counted_again() {
 }
 
 #[test]
+fn no_face_grows_beyond_the_size_allowed() {
+    let mesh = rounded_box(HALF, RADIUS, 4, 16);
+    let made = run("simplify-fit", "remove = \"90%\", tolerance = 0.1, max-size = 5.0", &surface(mesh.clone()));
+    let result = made.artifact.as_surface().unwrap();
+    let sides = result.faces.ids().flat_map(|f| {
+        let [a, b, c] = result.corners(f);
+        [a.distance(b), b.distance(c), c.distance(a)]
+    });
+    let longest = sides.fold(0.0, f64::max);
+    assert!(longest <= 5.0 * (1.0 + 1e-9), "a side is {longest} long");
+    assert!(result.faces.len() < mesh.faces.len() / 2, "{} faces", result.faces.len());
+}
+
+#[test]
+fn what_bars_more_is_told_for_every_edge_that_is_left() {
+    let from = surface(rounded_box(HALF, RADIUS, 4, 6));
+    let tight = run("simplify-fit", "target-faces = 20, tolerance = 0.05", &from);
+    assert_eq!(tight.stats["status"], "stuck");
+    let bars = tight.stats["barred"].as_object().unwrap();
+    let sum: u64 = bars.values().map(|count| count.as_u64().unwrap()).sum();
+    assert_eq!(2 * sum, 3 * tight.stats["faces-after"].as_u64().unwrap());
+    assert!(bars["tolerance"].as_u64().unwrap() > 0, "{bars:?}");
+    let loose = run("simplify-fit", "remove = \"30%\", tolerance = 0.1", &from);
+    assert_eq!(loose.stats["status"], "target-reached");
+    assert!(loose.stats.get("barred").is_none());
+}
+
+#[test]
 fn topology_is_kept_on_many_meshes() {
     let shipped = |file: &str| {
         let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/meshes").join(file);

@@ -14,10 +14,10 @@ use crate::technique::collapse::{CollapseRules, Editor, Merge};
 use crate::technique::dispersion::{amended_length, vertex_dispersion};
 
 /// Positions that get the costly tests, best first.
-const MOST_TRIED: usize = 2;
+pub(super) const MOST_TRIED: usize = 2;
 
 /// The most edges at a merged vertex. Tessellations come with more; those stay until something else takes them.
-const MOST_VALENCE: usize = 14;
+pub(super) const MOST_VALENCE: usize = 14;
 
 /// What was done, by case.
 #[derive(Clone, Copy, Debug, Default)]
@@ -48,6 +48,8 @@ pub(super) struct Bench<'e, 'a> {
     pub(super) surfaces: &'e mut Surfaces,
     pub(super) dispersion: Vec<f32>,
     pub(super) done: Done,
+    /// Positions that get the costly tests.
+    pub(super) most_tried: usize,
     /// Whether the tolerance bounds `Err` of a projection only.
     pub(super) plane_tolerance: Option<f64>,
 }
@@ -82,7 +84,7 @@ impl Bench<'_, '_> {
         self.update(v);
     }
 
-    fn edge_length(&self, e: EdgeId) -> f64 {
+    pub(super) fn edge_length(&self, e: EdgeId) -> f64 {
         let mesh = self.editor.mesh();
         let [a, b] = mesh.ends(e).map(|v| mesh.point(v));
         a.distance(b)
@@ -250,6 +252,18 @@ impl Bench<'_, '_> {
         self.place(&merge, &wishes, normal, fits.then_some([Kind::Cylinder, Kind::Sphere]), rules)
     }
 
+    /// Merges the ends of an edge whatever case they are.
+    pub(super) fn merge_any(&mut self, e: EdgeId, rules: &CollapseRules) -> bool {
+        let fits = self.on_surface(self.editor.mesh().ends(e));
+        let Some(v) = self.merge_edge(e, rules, fits) else { return false };
+        let ring: SmallVec<[VertexId; 16]> = self.editor.mesh().neighbours(v).collect();
+        self.update(v);
+        for w in ring {
+            self.update(w);
+        }
+        true
+    }
+
     /// Merges the ends of an edge where one of them is.
     fn merge_onto(&mut self, e: EdgeId, stay: VertexId, rules: &CollapseRules) -> Option<VertexId> {
         let merge = self.editor.plan_edge(e, rules)?;
@@ -280,7 +294,7 @@ impl Bench<'_, '_> {
                 wishes.push(p);
             }
         }
-        wishes.truncate(MOST_TRIED);
+        wishes.truncate(self.most_tried);
     }
 
     /// Puts the merged vertex where the first wish allows, projected onto a fit where one is asked for and found.

@@ -132,6 +132,10 @@ pub struct SimplifyFitParams {
     /// quality.
     #[schemars(range(min = 2.0))]
     pub max_aspect: f64,
+    /// Longest side of a face: no edit makes a longer one. What is longer already is left; `refine` first to halve it.
+    /// Default: no limit.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub max_size: Option<Length>,
     /// Whether the smooth edges of flat faces are kept as curves, so that flat faces stay flat. Default `true`.
     pub keep_flat: bool,
 }
@@ -153,6 +157,7 @@ impl Default for SimplifyFitParams {
             fine_aspect: 3.0,
             fit: Fits::Both,
             max_aspect: 20.0,
+            max_size: None,
             keep_flat: true,
         }
     }
@@ -202,6 +207,9 @@ const MOST_MENDINGS: usize = 5;
 /// Searches for what single edits do not mend, and mending after each.
 const MOST_SEARCHES: usize = 3;
 
+/// Times that what is left is collapsed whatever its case, and polished.
+const MOST_ENDINGS: usize = 3;
+
 /// Rounds of flips and relaxation at the end.
 const POLISH_ROUNDS: usize = 3;
 
@@ -228,6 +236,8 @@ pub fn simplify_fit(
     let mut fits = Surfaces::new(editor.mesh().vertex_slots(), plan.tolerance);
     let done = run(&mut editor, &mut fits, params, &plan, watch)?;
     let counts = editor.counts();
+    let is_short = editor.mesh().face_count() > plan.target;
+    let barred = is_short.then(|| report::bars(&mut editor, plan.setup.limits.min_stretch));
     let distance_bound = editor.certified_distance(plan.tolerance);
     let slots: Vec<VertexId> = editor.mesh().vertices().collect();
     let on_fits: Vec<_> = slots.iter().map(|&v| on_fit(&fits, editor.mesh().point(v), v)).collect();
@@ -251,6 +261,7 @@ pub fn simplify_fit(
     stats.largest_projection = done.largest_projection;
     stats.refused_by_tolerance = counts.beyond_tolerance;
     stats.refused_by_intersection = counts.collisions;
+    stats.barred = barred;
     stats.smooth_edges = smooth_edges;
     stats.tolerance = plan.tolerance;
     stats.distance_bound = distance_bound;
@@ -273,6 +284,7 @@ fn run(
         params,
         surfaces: fits,
         done: Done::default(),
+        most_tried: cases::MOST_TRIED,
         plane_tolerance: is_plane.then_some(plan.tolerance),
     };
     insert::flip_within_planes(&mut bench, watch)?;
@@ -288,19 +300,33 @@ fn run(
             break;
         }
     }
-    if reached {
-        mend::polish(&mut bench, POLISH_ROUNDS, watch)?;
+    end(&mut bench, reached, plan, watch)?;
+    Ok(bench.done)
+}
+
+/// What the loop of the paper leaves: faces above the target, poor shapes, and single faces above the aspect ratio.
+fn end(bench: &mut Bench<'_, '_>, mut reached: bool, plan: &Plan, watch: &Watch) -> Result<(), Cancelled> {
+    let limit = plan.setup.limits.min_stretch;
+    for _ in 0..MOST_ENDINGS {
+        let before = bench.editor.mesh().face_count();
+        reached = reached || queue::exhaust(bench, plan.target, watch)?;
+        mend::polish(bench, POLISH_ROUNDS, watch)?;
+        if reached || bench.editor.mesh().face_count() == before {
+            break;
+        }
     }
     for _ in 0..MOST_SEARCHES {
-        if mend::mend_by_search(&mut bench, limit, watch)? == 0 {
+        if mend::mend_by_search(bench, limit, watch)? == 0 {
             break;
         }
         // The few that are left get vertices after all, and the faces that this costs go elsewhere.
-        mend::mend(&mut bench, limit, watch)?;
+        mend::mend(bench, limit, watch)?;
         bench.update_all();
-        queue::simplify(&mut bench, plan.target, watch)?;
+        if !queue::simplify(bench, plan.target, watch)? {
+            queue::exhaust(bench, plan.target, watch)?;
+        }
     }
-    Ok(bench.done)
+    Ok(())
 }
 
 /// What the parameters come to on this input.
@@ -330,9 +356,13 @@ impl Plan {
             return Err(SimplifyFitError::OutOfRange { name: "tolerance", range, value: tolerance });
         }
         let feature_tolerance = params.feature_tolerance.map_or(tolerance, |length| length.resolve(diagonal));
+        let max_size = params.max_size.map_or(f64::INFINITY, |length| length.resolve(diagonal));
+        if max_size.is_nan() || max_size <= 0.0 {
+            return Err(SimplifyFitError::OutOfRange { name: "max-size", range: "above 0", value: max_size });
+        }
         let limits = Limits {
             min_stretch: least_stretch_of(params.max_aspect),
-            max_size: SizeField::Uniform(f64::INFINITY),
+            max_size: SizeField::Uniform(max_size),
             // Halving must not be stopped by the fans of a tessellation; merges have a limit of their own.
             max_valence: usize::MAX,
         };
@@ -420,7 +450,7 @@ pub struct Step;
 
 impl crate::step::Step for Step {
     const NAME: &'static str = "simplify-fit";
-    const REVISION: u32 = 3;
+    const REVISION: u32 = 4;
     const INPUTS: &'static [InputDef] = &[
         InputDef { name: "from", accepts: &[Port::Surface], required: true, doc: "the surface to simplify" },
         InputDef {

@@ -1,7 +1,7 @@
 //! The queue of faces by amended shortest length, and its rounds.
 
 use super::cases::{Bench, Outcome};
-use crate::mesh::{FaceId, VertexId};
+use crate::mesh::{EdgeId, FaceId, VertexId};
 use crate::technique::collapse::{CollapseRules, Order, Priority};
 use crate::technique::heap::IndexedHeap;
 use crate::watch::{Cancelled, Watch};
@@ -47,6 +47,58 @@ pub(super) fn simplify(bench: &mut Bench<'_, '_>, target: usize, watch: &Watch) 
     Ok(false)
 }
 
+/// Sweeps over all edges before [`exhaust`] ends.
+const MOST_SWEEPS: usize = 8;
+
+/// Positions that [`exhaust`] tests in full.
+const ALL_PLACES: usize = 6;
+
+/// Collapses what no test refuses, shortest first, whatever its case and length: for a target that the paper's rounds have
+/// not reached. Returns whether it is.
+pub(super) fn exhaust(bench: &mut Bench<'_, '_>, target: usize, watch: &Watch) -> Result<bool, Cancelled> {
+    watch.phase("exhaust", None);
+    let rules = rules(bench.editor.limits().min_stretch);
+    let usual = std::mem::replace(&mut bench.most_tried, ALL_PLACES);
+    let mut refused = vec![u64::MAX; bench.editor.mesh().edge_slots()];
+    for _ in 0..MOST_SWEEPS {
+        let before = bench.editor.mesh().face_count();
+        let mut edges: Vec<(f64, EdgeId)> = bench.editor.mesh().edges().map(|e| (bench.edge_length(e), e)).collect();
+        edges.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        for (place, (_, e)) in edges.into_iter().enumerate() {
+            if place.is_multiple_of(WATCH_EVERY) {
+                watch.check()?;
+            }
+            if bench.editor.mesh().face_count() <= target {
+                break;
+            }
+            let mesh = bench.editor.mesh();
+            if !mesh.edge_is_live(e) {
+                continue;
+            }
+            let age = mesh.ends(e).into_iter().map(|v| u64::from(mesh.version(v))).sum();
+            if refused[e.index()] != age && !bench.merge_any(e, &rules) {
+                refused[e.index()] = age;
+            }
+        }
+        let left = bench.editor.mesh().face_count();
+        if left <= target || left == before {
+            break;
+        }
+    }
+    bench.most_tried = usual;
+    Ok(bench.editor.mesh().face_count() <= target)
+}
+
+fn rules(min_stretch: f64) -> CollapseRules {
+    CollapseRules {
+        min_stretch,
+        mean_stretch: 0.0,
+        mend_below: None,
+        order: Order::OnSurface,
+        priority: Priority::SmallFirst { size: 1.0 },
+    }
+}
+
 /// The length of the paper's first step, which it does not say how to estimate: equilateral faces of the mean area.
 fn first_length(bench: &Bench<'_, '_>, target: usize) -> f64 {
     let mesh = bench.editor.mesh();
@@ -72,13 +124,7 @@ impl Queue {
         target: usize,
         watch: &Watch,
     ) -> Result<bool, Cancelled> {
-        let rules = CollapseRules {
-            min_stretch: comfort,
-            mean_stretch: 0.0,
-            mend_below: None,
-            order: Order::OnSurface,
-            priority: Priority::SmallFirst { size: 1.0 },
-        };
+        let rules = rules(comfort);
         let faces: Vec<FaceId> = bench.editor.mesh().faces().collect();
         for f in faces {
             self.push(bench, f);

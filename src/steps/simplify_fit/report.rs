@@ -5,9 +5,11 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use super::cases::MOST_VALENCE;
 use crate::mesh::geometry::{aspect_ratio, centroid, stretch};
-use crate::mesh::{ResolvedFreedom, Surface};
+use crate::mesh::{EdgeId, ResolvedFreedom, Surface};
 use crate::technique::collapse::session::{Cause, cause};
+use crate::technique::collapse::{Bars, CollapseRules, Editor, Order, Priority};
 use crate::technique::fit::Quadric;
 
 /// How it ended.
@@ -145,6 +147,9 @@ pub struct SimplifyFitStats {
     pub refused_by_tolerance: usize,
     /// Edits refused because faces would have intersected.
     pub refused_by_intersection: usize,
+    /// Where faces are left over: the edges that are left, by what bars their collapse, whatever their length.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub barred: Option<Bars>,
     /// Least stretch.
     pub min_stretch: f64,
     /// Mean stretch.
@@ -193,6 +198,23 @@ pub(super) fn histogram(fits: impl Iterator<Item = (FitKind, f64)>) -> Vec<Radiu
     bins
 }
 
+/// What bars the edges that are left.
+pub(super) fn bars(editor: &mut Editor<'_>, min_stretch: f64) -> Bars {
+    let rules = CollapseRules {
+        min_stretch,
+        mean_stretch: 0.0,
+        mend_below: None,
+        order: Order::OnSurface,
+        priority: Priority::SmallFirst { size: 1.0 },
+    };
+    let edges: Vec<EdgeId> = editor.mesh().edges().collect();
+    let mut bars = Bars::default();
+    for e in edges {
+        bars.add(editor.bar_of(e, &rules, MOST_VALENCE));
+    }
+    bars
+}
+
 /// The figures that are counted on the result alone.
 pub(super) fn quality(
     result: &Surface,
@@ -236,6 +258,7 @@ pub(super) fn quality(
         largest_projection: 0.0,
         refused_by_tolerance: 0,
         refused_by_intersection: 0,
+        barred: None,
         min_stretch: least,
         mean_stretch: sum / count.max(1) as f64,
         share_below_20: below_20 as f64 / count.max(1) as f64,

@@ -6,6 +6,7 @@
 use glam::DVec3;
 use smallvec::SmallVec;
 
+use super::bars::Bar;
 use super::editor::{CollapseRules, Editor};
 use super::limits::least_stretch;
 use super::placement::Site;
@@ -176,6 +177,31 @@ impl Editor<'_> {
 }
 
 impl Editor<'_> {
+    /// The first test that refuses the merge at `p`, or none; nothing is done.
+    pub(super) fn bar_at(&mut self, merge: &Merge, p: DVec3, rules: &CollapseRules) -> Bar {
+        if self.assess_merge(merge, p, rules).is_none() {
+            let floor = least_stretch(rules.min_stretch, merge.before.stretch_min);
+            for points in &mut self.patch.points {
+                points[0] = p;
+            }
+            let is_poor = self.patch.points.iter().any(|&points| stretch(points) < floor);
+            return if is_poor || !self.folds() { Bar::Shape } else { Bar::FoldOver };
+        }
+        if let Kind::Edge(plan) = &merge.kind
+            && !self.curve_admits(plan, p)
+        {
+            return Bar::Curves;
+        }
+        let beyond = self.counts.beyond_tolerance;
+        if self.patch_admitted() {
+            Bar::Nothing
+        } else if self.counts.beyond_tolerance > beyond {
+            Bar::Tolerance
+        } else {
+            Bar::Intersection
+        }
+    }
+
     /// Sets the least stretch that edits keep, and gives the one that held: for halvings, which make a face worse before
     /// the next one makes both better.
     pub fn set_min_stretch(&mut self, least: f64) -> f64 {

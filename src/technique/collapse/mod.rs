@@ -16,6 +16,7 @@
 //! the time, and the mean stretch of the result is higher.
 //! Cost: O(F log F), about two ratings a collapse.
 
+mod bars;
 mod boxes;
 mod clip;
 pub mod collision;
@@ -38,6 +39,7 @@ use queue::Queue;
 
 use crate::watch::{Cancelled, Watch};
 
+pub use bars::{Bar, Bars};
 pub use editor::{Attempt, CollapseRules, Counts, Editor};
 pub use envelope::Envelope;
 pub use keeper::{Curves, Keeper};
