@@ -223,7 +223,7 @@ pub struct Step;
 
 impl StepContract for Step {
     const NAME: &'static str = "split";
-    const REVISION: u32 = 1;
+    const REVISION: u32 = 2;
     const INPUTS: &'static [InputDef] = &[InputDef {
         name: "from",
         accepts: &[Port::Surface],

@@ -3,13 +3,15 @@
 //! Every attempt starts from the best one so far and makes only those regions anew whose triangles changed. Where one
 //! makes a region worse, that region is left alone from then on.
 
+use std::f64::consts::FRAC_PI_2;
+
 use glam::DVec3;
 
 use super::check::{Check, Fault, mean_side, smaller};
 use super::reuse::{Attempt, signs, take_over};
 use super::settle::settle;
 use super::{QMorphError, QMorphParams, QMorphStats, sizes};
-use crate::technique::clean_quads::{clean, finish, sharpest_sector};
+use crate::technique::clean_quads::{clean, finish, sharpest_sector_of};
 use crate::technique::front::advance;
 use crate::technique::ground::Ground;
 use crate::technique::isotropic::{Rules, pair_up, polish, remesh, tighten};
@@ -33,6 +35,8 @@ const USEFUL: f64 = 0.2;
 const FAIR: f64 = 0.5;
 /// The sides of faces in the place of a poor one, as a part of its own.
 const ROOM: f64 = 0.7;
+/// Where those are shorter than this part of the size asked for there, that part counts in their stead.
+const LEAST_ROOM: f64 = 0.7;
 
 /// One run from the surface to clean quads, with all sizes times `scale`.
 pub(super) fn morph(
@@ -166,16 +170,15 @@ fn prepare(mesh: &mut Mixed, ground: &Ground<'_>, check: &Check, rules: Rules, w
 
 /// How much an attempt lacks, in all and by region: 0 where it holds to the tolerance with sound shapes.
 fn lack(mesh: &Mixed, faults: &[Fault], tolerance: f64, regions: usize) -> (f64, Vec<f64>) {
-    let fair = fair(mesh);
-    let (mut broken, mut least, mut poor) = (0.0, fair, 0.0);
+    let (mut broken, mut poorest, mut poor) = (0.0, 0.0_f64, 0.0);
     let mut by_region = vec![0.0; regions];
     for f in mesh.faces() {
         let quality = mesh.quality(f);
-        let short = (fair - quality).max(0.0);
+        let short = shortfall(mesh, f);
         let wrong = 10.0 * f64::from(quality <= 0.0) + 100.0 * f64::from(mesh.is_triangle(f));
         broken += wrong;
         poor += short;
-        least = least.min(quality);
+        poorest = poorest.max(short);
         by_region[mesh.region(f) as usize] += wrong + short;
     }
     let (mut worst, mut farthest) = (0.0_f64, vec![0.0_f64; regions]);
@@ -188,12 +191,20 @@ fn lack(mesh: &Mixed, faults: &[Fault], tolerance: f64, regions: usize) -> (f64,
         *lack += 4.0 * far;
     }
     // Many poor faces are no broken one.
-    (broken + 4.0 * worst + (fair - least) + (0.2 * poor).min(2.0), by_region)
+    (broken + 4.0 * worst + poorest + (0.2 * poor).min(2.0), by_region)
 }
 
-/// The shape that each face could have: good, or as good as the sharpest corner allows.
-fn fair(mesh: &Mixed) -> f64 {
-    sharpest_sector(mesh).map_or(FAIR, |angle| FAIR.min(0.9 * libm::sin(angle)))
+/// What a face lacks from the shape that it could have: good, or as good as the curves that meet at its corners allow.
+fn shortfall(mesh: &Mixed, f: u32) -> f64 {
+    let quality = mesh.quality(f);
+    if quality >= FAIR {
+        return 0.0;
+    }
+    let fair = match sharpest_sector_of(mesh, f) {
+        Some(angle) if angle < FRAC_PI_2 => FAIR.min(0.9 * libm::sin(angle)),
+        _ => FAIR,
+    };
+    (fair - quality).max(0.0)
 }
 
 /// Where another attempt should have smaller faces: at faults of sound faces, and at poor faces, whose strips get more
@@ -203,12 +214,18 @@ fn wanting(attempt: &Attempt, rests: &[bool], tolerance: f64) -> Vec<(DVec3, f64
     let wants = |f: u32| !rests[mesh.region(f) as usize];
     let sound = attempt.faults.iter().filter(|fault| wants(fault.face) && mesh.quality(fault.face) > USEFUL);
     let mut places = smaller(mesh, sound, tolerance);
-    let fair = fair(mesh);
-    for f in mesh.faces().filter(|&f| wants(f) && mesh.quality(f) < fair) {
-        let side = mean_side(mesh, f);
+    for f in mesh.faces().filter(|&f| wants(f) && shortfall(mesh, f) > 0.0) {
+        // A sliver's sides say nothing about what would do in its place.
+        let side = mean_side(mesh, f).max(LEAST_ROOM * mean_size(mesh, f));
         places.push((mesh.centre(f), 1.2 * side, ROOM * side));
     }
     places
+}
+
+/// The mean length of the sides that a face is to have.
+fn mean_size(mesh: &Mixed, f: u32) -> f64 {
+    let corners = mesh.corners(f);
+    corners.iter().map(|&v| mesh.size(v)).sum::<f64>() / corners.len() as f64
 }
 
 /// From triangles to clean quads in the regions that are awake.

@@ -28,7 +28,7 @@ use super::mixed::{Mixed, Place};
 use crate::watch::{Cancelled, Watch};
 use memory::Memory;
 
-pub use valence::{Census, census, sharpest_sector};
+pub use valence::{Census, census, sharpest_sector, sharpest_sector_of};
 
 /// A cleaned neighbourhood must be at least this good, or better than before.
 const GOOD: f64 = 0.35;

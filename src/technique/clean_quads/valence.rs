@@ -32,6 +32,24 @@ pub fn sharpest_sector(mesh: &Mixed) -> Option<f64> {
     nodes.flat_map(|v| sectors(mesh, v)).map(|(_, angle)| angle).min_by(f64::total_cmp)
 }
 
+/// The least angle between the curves on both sides of a face at one of its nodes, in radians: its corner there lies
+/// between them.
+pub fn sharpest_sector_of(mesh: &Mixed, f: u32) -> Option<f64> {
+    let at_nodes = mesh.sides(f).filter(|&h| mesh.place(mesh.origin(h)) == Place::Node);
+    at_nodes.filter_map(|h| sector_of(mesh, h)).min_by(f64::total_cmp)
+}
+
+/// The angle of the sector that the corner at the origin of `h` belongs to; `None` at a vertex without curves.
+fn sector_of(mesh: &Mixed, h: u32) -> Option<f64> {
+    let star: SmallVec<[u32; 16]> = mesh.star(mesh.origin(h)).collect();
+    let bound = |h: u32| mesh.arc(h) != NONE || mesh.face(h) == NONE || mesh.face(h ^ 1) == NONE;
+    let (n, at) = (star.len(), star.iter().position(|&k| k == h)?);
+    let first = (0..n).find(|back| bound(star[(at + n - back) % n]))?;
+    let sector = (0..n).map(|i| star[(at + n - first + i) % n]);
+    let inside = sector.enumerate().take_while(|&(i, k)| i == 0 || !bound(k));
+    Some(inside.filter(|&(_, k)| mesh.face(k) != NONE).map(|(_, k)| mesh.corner_angle(k)).sum())
+}
+
 /// The sectors between the curves and rims at a vertex, each with its quads and its angle; none where there is no curve.
 pub(super) fn sectors(mesh: &Mixed, v: u32) -> SmallVec<[(f64, f64); 8]> {
     let mut found = SmallVec::new();

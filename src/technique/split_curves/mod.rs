@@ -3,7 +3,8 @@
 //! R. Miyazaki and K. Harada, *Transformation of a closed 3D triangular mesh to a quadrilateral mesh based on feature
 //! edges*, section 3.3: the corners and crossings of a face in a loop, cut by one segment after the other. Nothing is
 //! computed but the order of points: crossings are shared by both faces of an edge, and two segments of a face cross if
-//! their ends alternate round it. Crossings near a vertex snap to it, which spares slivers. The paper's fan of triangles
+//! their ends alternate round it. Crossings near a vertex snap to it, which spares slivers; a crossing beside it on the way,
+//! from which the curve would turn along an edge, goes with it. The paper's fan of triangles
 //! may take three points of one side; here each cell is cut so that its worst triangle is best.
 //!
 //! Invariants: all new vertices lie on old edges, so the surface stays as a point set; every segment of a curve is an
@@ -126,13 +127,16 @@ struct Flank {
 type Flanks = FxHashMap<[VertexId; 2], Flank>;
 
 /// Cuts a surface along its `curves`. Points within the share `snap` of an edge from a vertex that no curve touches
-/// snap to it; other points keep that distance from vertices and from each other where there is room.
+/// snap to it, and so do those from which the curve would then go along their edge; other points keep that distance from
+/// vertices and from each other where there is room.
 ///
 /// # Errors
 /// See [`SplitError`].
 pub fn split_along(surface: &Surface, edges: &EdgeTable, curves: &[Curve], snap: f64) -> Result<Split, SplitError> {
     let mut sites = Sites::collect(surface, edges, curves)?;
     let snapped = sites.snap(snap);
+    let is_marked = |e| surface.carried.marks.contains_key(&edges.key(e)) || edges.sides(e).len() != 2;
+    let cut_corners = if snap > 0.0 { sites.cut_corners(&|e| !is_marked(e)) } else { 0 };
     let shifted = sites.spread(snap);
     let layout = sites.number();
     let mut points: IdVec<Vertex, DVec3> = surface.points.clone();
@@ -145,5 +149,5 @@ pub fn split_along(surface: &Surface, edges: &EdgeTable, curves: &[Curve], snap:
     let labels = labels::flood(surface, &result, &parents, &segments.flanks)?;
     result.carried = inherit::inherit(surface, edges, &layout, &parents, labels, result.points.len());
     let sites::Layout { crossings, chains, .. } = layout;
-    Ok(Split { surface: result, parents, crossings, chains, snapped, shifted })
+    Ok(Split { surface: result, parents, crossings, chains, snapped: snapped + cut_corners, shifted })
 }

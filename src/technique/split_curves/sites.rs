@@ -1,6 +1,6 @@
 //! The points of curves: where they are, which snap, and the numbers of the new vertices.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::{Flank, Flanks, SplitError};
 use crate::mesh::id::Vertex;
@@ -73,13 +73,14 @@ impl<'a> Sites<'a> {
         }
     }
 
-    /// The points before and after one of a curve.
-    fn neighbours(&self, (curve, point): Place) -> [Option<Site>; 2] {
+    /// The numbers of the points before and after one of a curve, past those at the same vertex.
+    fn beside(&self, (curve, point): Place) -> [Option<usize>; 2] {
         let sites = &self.places[curve];
-        let wraps = self.curves[curve].is_closed && sites.len() > 1;
-        let before = point.checked_sub(1).or_else(|| wraps.then(|| sites.len() - 1));
-        let after = if point + 1 < sites.len() { Some(point + 1) } else { wraps.then_some(0) };
-        [before, after].map(|k| k.map(|k| sites[k]))
+        let (n, is_closed) = (sites.len(), self.curves[curve].is_closed);
+        let other = |k: &usize| sites[*k] != sites[point];
+        let before = (0..point).rev().chain((point + 1..n).rev().take_while(|_| is_closed)).find(other);
+        let after = (point + 1..n).chain((0..point).take_while(|_| is_closed)).find(other);
+        [before, after]
     }
 
     /// Snaps points to vertices, nearest first; returns how many. A point snaps only if it is the last one before the
@@ -108,10 +109,8 @@ impl<'a> Sites<'a> {
 
     fn try_snap(&mut self, place: Place, v: VertexId) -> bool {
         let Site::Edge(e, _) = self.places[place.0][place.1] else { return false };
-        let Some(places) = self.on_edge.get(&e) else { return false };
-        let outermost = if self.edges.key(e)[0] == v { places.first() } else { places.last() };
-        let adjoins = self.neighbours(place).contains(&Some(Site::Vertex(v)));
-        if outermost != Some(&place) || (self.is_taken[v] && !adjoins) {
+        let adjoins = self.beside(place).iter().flatten().any(|&k| self.places[place.0][k] == Site::Vertex(v));
+        if !self.is_last(place, e, v) || (self.is_taken[v] && !adjoins) {
             return false;
         }
         self.places[place.0][place.1] = Site::Vertex(v);
@@ -120,6 +119,94 @@ impl<'a> Sites<'a> {
             places.retain(|other| *other != place);
         }
         true
+    }
+
+    /// Leaves out points from which a curve goes along their edge to a vertex: from the point before it gets there
+    /// through the same face, shorter and without a kink. Sides of faces for which `is_free` does not hold are not used
+    /// for it. Returns how many.
+    pub(super) fn cut_corners(&mut self, is_free: &impl Fn(EdgeId) -> bool) -> usize {
+        let mut waiting: Vec<Place> = self.on_edge.values().flatten().copied().collect();
+        waiting.sort_unstable();
+        let mut followed = self.followed();
+        let mut left_out = 0;
+        loop {
+            let before = waiting.len();
+            waiting.retain(|&place| !self.try_cut_corner(place, &mut followed, is_free));
+            left_out += before - waiting.len();
+            if waiting.len() == before {
+                return left_out;
+            }
+        }
+    }
+
+    /// The edges that curves follow from end to end.
+    fn followed(&self) -> BTreeSet<EdgeId> {
+        let mut followed = BTreeSet::new();
+        for (curve, sites) in self.places.iter().enumerate() {
+            for point in 0..sites.len() {
+                if let [_, Some(next)] = self.beside((curve, point))
+                    && let (Site::Vertex(v), Site::Vertex(w)) = (sites[point], sites[next])
+                {
+                    followed.extend(self.edges.find(crate::mesh::edge_key(v, w)));
+                }
+            }
+        }
+        followed
+    }
+
+    fn try_cut_corner(
+        &mut self,
+        place: Place,
+        followed: &mut BTreeSet<EdgeId>,
+        is_free: &impl Fn(EdgeId) -> bool,
+    ) -> bool {
+        let (curve, point) = place;
+        let sites = &self.places[curve];
+        let (Site::Edge(e, _), [Some(before), Some(after)]) = (sites[point], self.beside(place)) else { return false };
+        let ends = self.edges.key(e);
+        let (v, far) = match (sites[before], sites[after]) {
+            (Site::Vertex(v), _) if ends.contains(&v) => (v, after),
+            (_, Site::Vertex(v)) if ends.contains(&v) => (v, before),
+            _ => return false,
+        };
+        // Nothing else may lie on the way.
+        let side = match sites[far] {
+            Site::Vertex(w) => {
+                let side = self.edges.find(crate::mesh::edge_key(v, w));
+                let empty = |e: &EdgeId| self.on_edge.get(e).is_none_or(Vec::is_empty);
+                let Some(side) = side.filter(|e| empty(e) && is_free(*e) && !followed.contains(e)) else {
+                    return false;
+                };
+                Some(side)
+            }
+            Site::Edge(other, _) if self.edges.key(other).contains(&v) && !self.is_last((curve, far), other, v) => {
+                return false;
+            }
+            Site::Edge(..) => None,
+        };
+        if !self.is_last(place, e, v) || !self.has_spare_points(curve) {
+            return false;
+        }
+        followed.extend(side);
+        self.places[curve][point] = Site::Vertex(v);
+        if let Some(places) = self.on_edge.get_mut(&e) {
+            places.retain(|other| *other != place);
+        }
+        true
+    }
+
+    /// Whether no other point lies between this one and an end of its edge.
+    fn is_last(&self, place: Place, e: EdgeId, v: VertexId) -> bool {
+        let Some(places) = self.on_edge.get(&e) else { return false };
+        let outermost = if self.edges.key(e)[0] == v { places.first() } else { places.last() };
+        outermost == Some(&place)
+    }
+
+    /// Whether a curve stays one without a point.
+    fn has_spare_points(&self, curve: usize) -> bool {
+        let mut sites = self.places[curve].clone();
+        sites.dedup();
+        sites.len() > if self.curves[curve].is_closed { 5 } else { 4 }
     }
 
     /// Moves points along their edges, in order, until they are `share` of the edge from its ends and each other, or as

@@ -132,6 +132,19 @@ fn points_snap_to_free_vertices_only() {
 }
 
 #[test]
+fn a_curve_does_not_turn_along_an_edge_to_a_vertex_it_snapped_to() {
+    let points = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]];
+    let fan = mesh(&points, &[[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 1]]);
+    let points = [on(3, 4, 0.5), on(0, 3, 0.5), on(0, 2, 0.05), on(0, 1, 0.5), on(1, 4, 0.5)];
+    let over = [curve(&points, [1, 0])];
+    let made = cut(&fan, &over, 0.1).unwrap();
+    // The point on the spoke to 3 goes, after which the curve has no point to spare.
+    assert_eq!((made.snapped, made.crossings.len()), (2, 3));
+    assert_eq!((made.chains[0].len(), made.chains[0][1]), (4, id(0)));
+    assert_sound(&fan, &over, &made);
+}
+
+#[test]
 fn faces_beyond_any_curve_keep_their_regions() {
     let mut two = mesh(
         &[[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [5.0, 0.0, 0.0], [6.0, 0.0, 0.0], [5.0, 1.0, 0.0]],
