@@ -19,6 +19,9 @@ pub struct Quads {
 pub struct Cover {
     /// The [`shape_hash`](super::Surface::shape_hash) of the covered surface.
     pub surface: [u8; 32],
-    /// For each element the faces it covers, in rising order; every face of the surface occurs once.
+    /// Where that surface was too coarse: its faces that were cut in four before it was covered, round by round, each
+    /// round numbered as the round before left them. Empty where it was fine enough.
+    pub cuts: Vec<Vec<FaceId>>,
+    /// For each element the faces it covers, in rising order; every face of the surface, after these cuts, occurs once.
     pub faces: IdVec<Face, Vec<FaceId>>,
 }

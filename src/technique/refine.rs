@@ -15,7 +15,7 @@ use crate::mesh::freedom::ResolvedFreedom;
 use crate::mesh::geometry::triangle_area;
 use crate::mesh::id::{Edge, Face};
 use crate::mesh::topology::EdgeTable;
-use crate::mesh::{EdgeId, FreedomError, IdVec, LockRules, Surface, resolve_freedom};
+use crate::mesh::{EdgeId, FaceId, FreedomError, IdVec, LockRules, Surface, resolve_freedom};
 use crate::technique::halve_edges::{Halved, agree_on_seams, halve_edges, predict_faces, seam_copies};
 use crate::watch::{Cancelled, Watch};
 
@@ -97,6 +97,26 @@ pub fn subdivide(
     }
     report.longest = current.longest();
     Ok((current.surface, report))
+}
+
+/// Cuts some faces in four, and those beside them to match; also the face that each was cut from. Kept edges stay.
+///
+/// # Errors
+/// See [`RefineError`].
+pub fn quarter(
+    surface: &Surface,
+    faces: &[FaceId],
+    max_faces: usize,
+) -> Result<(Surface, IdVec<Face, FaceId>), RefineError> {
+    let round = Round::new(surface.clone(), &LockRules::default())?;
+    let sides = round.edges.edges_of_triangles(surface.faces.len());
+    let mut halve: IdVec<Edge, bool> = IdVec::filled(false, round.edges.len());
+    for &e in faces.iter().filter_map(|&f| sides.get(f)).flatten() {
+        halve[e] = round.may[e];
+    }
+    agree_on_seams(&round.copies, &round.may, &mut halve);
+    let halved = round.halve(&halve, max_faces)?;
+    Ok((halved.surface, halved.parents))
 }
 
 /// Halves edges longer than their limit until there is none.
@@ -322,6 +342,17 @@ mod tests {
         assert!(matches!(error, RefineError::TooManyFaces { max_faces: 64, .. }));
         let error = refine(&mesh, &MaxEdge::Uniform(1e-9), 64, &LockRules::default(), &Watch::silent()).unwrap_err();
         assert!(matches!(error, RefineError::TooManyFaces { .. }));
+    }
+
+    #[test]
+    fn one_face_in_four_cuts_the_face_beside_it_in_two() {
+        let points = [[0.0; 3], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
+        let mesh = surface(&points, &[[0, 1, 2], [0, 2, 3]]);
+        let (out, parents) = quarter(&mesh, &[FaceId::new(0)], 100).expect("cut");
+        assert_eq!(validate_surface(&out), []);
+        let parts = |f: usize| parents.iter().filter(|&&p| p == FaceId::new(f)).count();
+        assert_eq!((out.faces.len(), parts(0), parts(1)), (6, 4, 2));
+        assert!(matches!(quarter(&mesh, &[FaceId::new(0)], 5), Err(RefineError::TooManyFaces { .. })));
     }
 
     #[test]

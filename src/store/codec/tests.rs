@@ -49,15 +49,16 @@ fn quads(cover: Option<Cover>) -> Artifact {
 
 #[test]
 fn quads_come_back_with_what_they_cover() {
-    let cover = Cover { surface: [7; 32], faces: vec![vec![id(0), id(2)], vec![id(1)]].into() };
-    for cover in [None, Some(cover)] {
+    let cover = Cover { surface: [7; 32], cuts: Vec::new(), faces: vec![vec![id(0), id(2)], vec![id(1)]].into() };
+    let cut = Cover { cuts: vec![vec![id(2)], Vec::new(), vec![id(0), id(5)]], ..cover.clone() };
+    for cover in [None, Some(cover), Some(cut)] {
         let bytes = encode(&quads(cover.clone()));
         let Artifact::Quads(after) = decode(&bytes).unwrap() else { panic!("quads went in") };
         assert_eq!(after.cover, cover);
         assert_eq!(encode(&Artifact::Quads(after)), bytes);
         assert!((0..bytes.len()).all(|end| decode(&bytes[..end]).is_err()));
     }
-    let short = Cover { surface: [7; 32], faces: vec![vec![id(0)]].into() };
+    let short = Cover { surface: [7; 32], cuts: Vec::new(), faces: vec![vec![id(0)]].into() };
     assert!(decode(&encode(&quads(Some(short)))).is_err(), "one list of faces for two elements");
 }
 

@@ -27,7 +27,7 @@ pub fn to_quads(layout: &Layout<'_>) -> Quads {
             mesh.carried.pin(number[v], Freedom::Keep);
         }
     }
-    let mut cover = Cover { surface: ground.surface.shape_hash(), faces: IdVec::new() };
+    let mut cover = Cover { surface: ground.surface.shape_hash(), ..Cover::default() };
     for &(_, cell) in &elements {
         let mut nodes: Vec<VertexId> = layout.nodes(cell).into_iter().map(|v| number[v]).collect();
         mark_borders(layout, cell, &nodes, &mut mesh.carried);
