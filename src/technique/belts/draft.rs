@@ -1,7 +1,8 @@
 //! The belts while they are cut into elements: nodes so far, and the paths laid as walls.
 
-use rustc_hash::FxHashMap;
+use rustc_hash::{FxHashMap, FxHashSet};
 
+use super::even::settle;
 use super::sample::{Rope, fill_gaps, forced};
 use super::strips::{Belts, border_loops};
 use super::{BeltRules, Order};
@@ -22,6 +23,8 @@ pub(super) struct Draft<'g> {
     pub(super) snap: f64,
     pub(super) node: IdVec<Vertex, bool>,
     pub(super) fixed: IdVec<Vertex, bool>,
+    /// Edges between domains that have all their nodes.
+    settled: FxHashSet<EdgeKey>,
     /// Edges laid, with the inner end of their path.
     pub(super) walls: FxHashMap<EdgeKey, VertexId>,
     /// Vertices on walls.
@@ -34,7 +37,8 @@ pub(super) struct Draft<'g> {
 
 impl<'g> Draft<'g> {
     pub(super) fn new(ground: &'g Ground<'g>, belts: Belts, rules: &BeltRules) -> Self {
-        let (node, fixed) = forced(ground, &belts, rules.interval);
+        let (mut node, fixed) = forced(ground, &belts, rules.interval);
+        let settled = settle(ground, &mut node, rules.interval);
         Self {
             ground,
             interval: rules.interval,
@@ -42,6 +46,7 @@ impl<'g> Draft<'g> {
             snap: rules.snap,
             node,
             fixed,
+            settled,
             walls: FxHashMap::default(),
             taken: IdVec::filled(false, ground.surface.points.len()),
             done: vec![false; belts.count],
@@ -124,7 +129,9 @@ impl<'g> Draft<'g> {
     /// Fills the gaps of a loop; not much where the belt beyond is cut already.
     fn sample(&mut self, sides: &[Side], rope: &Rope) {
         let (ground, belts, done) = (self.ground, &self.belts, &self.done);
-        let may_fill = |k: usize| !ground.beyond(sides[k]).is_some_and(|f| done[belts.of[f] as usize]);
+        let is_settled = |s: Side| self.settled.contains(&edge_key(ground.origin(s), ground.target(s)));
+        let is_cut = |s: Side| ground.beyond(s).is_some_and(|f| done[belts.of[f] as usize]);
+        let may_fill = |k: usize| !is_cut(sides[k]) && !is_settled(sides[k]);
         fill_gaps(rope, &mut self.node, self.interval, may_fill);
     }
 

@@ -4,6 +4,7 @@
 
 mod connect;
 mod draft;
+mod even;
 mod mend;
 mod sample;
 mod spine;
