@@ -26,6 +26,8 @@ pub struct Ground<'a> {
     pub faces_at: VertexFaces,
     /// Whether a vertex lies on the rim of the surface.
     pub on_rim: IdVec<Vertex, bool>,
+    /// Whether a vertex lies on the border of a domain, which the rim of the surface is too.
+    pub on_border: IdVec<Vertex, bool>,
     /// The domain of each face: faces of one region that hang together over edges.
     pub domain: IdVec<Face, u32>,
     /// How many domains there are.
@@ -51,7 +53,10 @@ impl<'a> Ground<'a> {
         let labels = surface.carried.regions.as_ref().map(|regions| &regions.labels);
         let label = |f: FaceId| labels.and_then(|labels| labels.get(f)).copied().unwrap_or(0);
         let (domain, domains) = components(&across, |a, b| label(a) == label(b));
-        Self { surface, across, faces_at: VertexFaces::new(surface), on_rim, domain, domains }
+        let faces_at = VertexFaces::new(surface);
+        let differ = |v: VertexId| faces_at.of(v).iter().any(|&f| domain[f] != domain[faces_at.of(v)[0]]);
+        let on_border = surface.points.ids().map(|v| on_rim[v] || differ(v)).collect();
+        Self { surface, across, faces_at, on_rim, on_border, domain, domains }
     }
 
     /// The coordinates of a vertex.

@@ -14,7 +14,9 @@
 pub mod couple;
 pub mod export;
 pub mod finder;
+pub mod finer;
 pub mod ground;
+mod lift;
 pub mod optimise;
 mod parallel;
 pub mod pattern;
@@ -28,6 +30,7 @@ use rustc_hash::FxHashMap;
 
 pub use export::to_quads;
 pub use finder::{Finder, Terrain, along};
+pub use finer::{Room, cut_again, with_rings};
 pub use ground::{Ground, Side, components};
 pub use pattern::Pattern;
 pub use replace::Undo;
@@ -60,6 +63,8 @@ pub struct Layout<'g> {
     /// Nodes that stay where they are: corners, and where borders of domains meet.
     pub fixed: IdVec<Vertex, bool>,
     around: FxHashMap<VertexId, Vec<u32>>,
+    /// How many patches of a domain each fixed node should have.
+    corners: FxHashMap<(VertexId, u32), usize>,
     pub(crate) finder: Finder,
 }
 
@@ -85,7 +90,9 @@ impl<'g> Layout<'g> {
         cell.enumerate().for_each(|(f, &c)| faces[c as usize].push(f));
         let finder = Finder::new(node.len());
         let rings = vec![Vec::new(); count];
-        let mut layout = Self { ground, cell, faces, rings, node, fixed, around: FxHashMap::default(), finder };
+        let corners = proposal::corners(ground, &fixed);
+        let mut layout =
+            Self { ground, cell, faces, rings, node, fixed, around: FxHashMap::default(), corners, finder };
         let mut bad = Vec::new();
         for c in 0..count as u32 {
             let ring = if layout.is_simply_connected(c) { layout.trace(c) } else { None };
@@ -171,8 +178,7 @@ impl<'g> Layout<'g> {
 
     /// Whether a node lies on the border of its domain.
     pub fn is_on_border(&self, node: VertexId) -> bool {
-        let faces = self.ground.faces_at.of(node);
-        self.ground.on_rim[node] || faces.iter().any(|&f| self.ground.domain[f] != self.ground.domain[faces[0]])
+        self.ground.on_border[node]
     }
 
     /// The area of a cell along its mean normal.
@@ -183,14 +189,8 @@ impl<'g> Layout<'g> {
     /// The least sine-like quality of the corners that these nodes make on a patch of this normal: 1 for a rectangle
     /// and for the equilateral triangle, 0 where a corner is straight, negative where it is reflex.
     pub fn quality(&self, nodes: &[VertexId], normal: DVec3) -> f64 {
-        let n = nodes.len();
-        let p = |i: usize| self.ground.point(nodes[i % n]);
-        let scale = if n == 3 { 2.0 / 3.0_f64.sqrt() } else { 1.0 };
-        let corner = |i: usize| {
-            let (to, from) = ((p(i + 1) - p(i)).normalize_or_zero(), (p(i + n - 1) - p(i)).normalize_or_zero());
-            scale * normal.dot(to.cross(from))
-        };
-        (0..n).map(corner).fold(f64::INFINITY, f64::min)
+        let corners: Vec<DVec3> = nodes.iter().map(|&v| self.ground.point(v)).collect();
+        quality(&corners, normal)
     }
 
     /// The quality of a cell.
@@ -268,4 +268,16 @@ impl<'g> Layout<'g> {
             }
         }
     }
+}
+
+/// See [`Layout::quality`].
+fn quality(corners: &[DVec3], normal: DVec3) -> f64 {
+    let n = corners.len();
+    let scale = if n == 3 { 2.0 / 3.0_f64.sqrt() } else { 1.0 };
+    let corner = |i: usize| {
+        let at = corners[i];
+        let (to, from) = (corners[(i + 1) % n] - at, corners[(i + n - 1) % n] - at);
+        scale * normal.dot(to.normalize_or_zero().cross(from.normalize_or_zero()))
+    };
+    (0..n).map(corner).fold(f64::INFINITY, f64::min)
 }

@@ -3,11 +3,15 @@
 use std::collections::BTreeMap;
 
 use glam::DVec3;
+use rustc_hash::FxHashMap;
 
-use super::Layout;
+use super::ground::Ground;
+use super::lift::Flat;
 use super::pattern::Pattern;
 use super::replace::Undo;
-use crate::mesh::VertexId;
+use super::{Layout, quality};
+use crate::mesh::id::Vertex;
+use crate::mesh::{IdVec, VertexId};
 
 /// What a triangle costs; an inner node with one patch too many costs 1.
 const TRIANGLE: f64 = 6.0;
@@ -24,12 +28,26 @@ fn is_new(v: VertexId) -> bool {
 }
 
 /// Cells to take away, and polygons over old and new nodes to put there.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Proposal {
     /// The cells; together a disk.
     pub cells: Vec<u32>,
     /// The polygons, counter-clockwise.
     pub faces: Vec<Vec<VertexId>>,
+}
+
+/// How many patches each domain should have at these nodes: one for each right angle.
+pub(super) fn corners(ground: &Ground<'_>, fixed: &IdVec<Vertex, bool>) -> FxHashMap<(VertexId, u32), usize> {
+    let mut angles: FxHashMap<(VertexId, u32), f64> = FxHashMap::default();
+    for v in fixed.ids().filter(|&v| fixed[v]) {
+        for &f in ground.faces_at.of(v) {
+            let corner = ground.corner_of(f, v).unwrap_or(0);
+            let angle = crate::mesh::geometry::triangle_angles(ground.surface.corners(f))[usize::from(corner)];
+            *angles.entry((v, ground.domain[f])).or_default() += angle;
+        }
+    }
+    let right_angles = |total: f64| ((total / std::f64::consts::FRAC_PI_2).round() as usize).max(1);
+    angles.into_iter().map(|(at, total)| (at, right_angles(total))).collect()
 }
 
 impl Layout<'_> {
@@ -42,13 +60,7 @@ impl Layout<'_> {
         if !self.fixed[node] {
             return 2;
         }
-        let faces = self.ground.faces_at.of(node).iter().filter(|&&f| self.ground.domain[f] == domain);
-        let angle = |&f: &crate::mesh::FaceId| {
-            let corner = self.ground.corner_of(f, node).unwrap_or(0);
-            crate::mesh::geometry::triangle_angles(self.ground.surface.corners(f))[usize::from(corner)]
-        };
-        let total: f64 = faces.map(angle).sum();
-        ((total / std::f64::consts::FRAC_PI_2).round() as usize).max(1)
+        self.corners.get(&(node, domain)).copied().unwrap_or(1)
     }
 
     /// How many cells of a domain a node has.
@@ -57,7 +69,7 @@ impl Layout<'_> {
     }
 
     /// What a node with so many patches costs.
-    fn strain(&self, node: VertexId, domain: u32, patches: usize) -> f64 {
+    pub(super) fn strain(&self, node: VertexId, domain: u32, patches: usize) -> f64 {
         let off = patches.abs_diff(self.wanted(node, domain)) as f64;
         let weight = if self.is_on_border(node) { BORDER } else { 1.0 };
         // An inner node of two patches is no corner of either.
@@ -68,10 +80,12 @@ impl Layout<'_> {
     /// The rim of some cells as nodes, counter-clockwise; `None` unless they form a disk.
     pub fn rim(&self, cells: &[u32]) -> Option<Vec<VertexId>> {
         let mut next = BTreeMap::new();
+        let mut sorted = cells.to_vec();
+        sorted.sort_unstable();
         for &cell in cells {
             let ring = self.ring(cell);
             for k in 0..ring.len() {
-                if self.beyond(cell, k).is_none_or(|other| !cells.contains(&other))
+                if self.beyond(cell, k).is_none_or(|other| sorted.binary_search(&other).is_err())
                     && next.insert(ring[k].node, ring[(k + 1) % ring.len()].node).is_some()
                 {
                     return None;
@@ -126,9 +140,18 @@ impl Layout<'_> {
     /// would be worse than `least` and worse than the old ones.
     pub fn carry_out(&mut self, proposal: &Proposal, least: f64) -> Option<Undo> {
         let rim = self.rim(&proposal.cells)?;
+        /// Fewer cells are nearly flat; what is relaxed keeps its connectivity and must not stay where it is.
+        const BENT: usize = 8;
+        let flat = (proposal.cells.len() > BENT).then(|| Flat::new(self, &proposal.cells, &rim));
+        let pattern = self.pattern(&rim, &proposal.faces, flat.as_ref());
+        self.fill(&proposal.cells, &rim, &pattern, least)
+    }
+
+    /// Polygons over the nodes of a rim and others, with places for these.
+    fn pattern(&self, rim: &[VertexId], polygons: &[Vec<VertexId>], flat: Option<&Flat>) -> Pattern {
         let mut index: BTreeMap<VertexId, usize> = rim.iter().enumerate().map(|(k, &v)| (v, k)).collect();
-        let mut faces = Vec::with_capacity(proposal.faces.len());
-        for face in &proposal.faces {
+        let mut faces = Vec::with_capacity(polygons.len());
+        for face in polygons {
             let mut corners = Vec::with_capacity(face.len());
             for &node in face {
                 let next = index.len();
@@ -138,9 +161,29 @@ impl Layout<'_> {
         }
         let inner = vec![DVec3::ZERO; index.len() - rim.len()];
         let mut pattern = Pattern { rim: rim.len(), inner, faces };
-        let points: Vec<DVec3> = rim.iter().map(|&v| self.ground.point(v)).collect();
-        pattern.relax(&points);
-        self.fill(&proposal.cells, &rim, &pattern, least)
+        match flat {
+            Some(flat) => flat.place(&mut pattern),
+            None => pattern.relax(&rim.iter().map(|&v| self.ground.point(v)).collect::<Vec<_>>()),
+        }
+        pattern
+    }
+
+    /// How badly shaped the polygons over a rim are likely to be, 0 for squares: the mean and the worst of the squares
+    /// of what their qualities lack.
+    pub(super) fn misshape(&self, rim: &[VertexId], polygons: &[Vec<VertexId>], flat: &Flat) -> f64 {
+        let pattern = self.pattern(rim, polygons, Some(flat));
+        let point = |&n: &usize| if n < rim.len() { self.ground.point(rim[n]) } else { pattern.inner[n - rim.len()] };
+        let (mut sum, mut worst) = (0.0, 0.0_f64);
+        for face in &pattern.faces {
+            let corners: Vec<DVec3> = face.iter().map(point).collect();
+            let n = corners.len();
+            let normal =
+                (1..n - 1).map(|k| (corners[k] - corners[0]).cross(corners[k + 1] - corners[0])).sum::<DVec3>();
+            let lack = 1.0 - quality(&corners, normal.normalize_or_zero());
+            sum += lack * lack;
+            worst = worst.max(lack * lack);
+        }
+        sum / pattern.faces.len().max(1) as f64 + worst
     }
 
     /// Replaces, and takes it back where a new cell is worse than `least` and worse than all old ones.

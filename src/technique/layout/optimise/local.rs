@@ -1,6 +1,6 @@
 //! Edits of a few cells: turned edges, collapsed and opened quads, nodes of two and three patches removed.
 
-use super::LEAST;
+use super::{LEAST, Memory};
 use crate::mesh::VertexId;
 use crate::technique::layout::Layout;
 use crate::technique::layout::proposal::{Proposal, new_node};
@@ -10,7 +10,7 @@ use crate::watch::{Cancelled, Watch};
 const LESS: f64 = -1e-9;
 
 /// Carries out edits that lower the cost, until there is none; how many.
-pub(super) fn improve(layout: &mut Layout<'_>, watch: &Watch) -> Result<usize, Cancelled> {
+pub(super) fn improve(layout: &mut Layout<'_>, memory: &mut Memory, watch: &Watch) -> Result<usize, Cancelled> {
     /// Later passes hardly find anything.
     const PASSES: usize = 8;
     let mut total = 0;
@@ -19,7 +19,7 @@ pub(super) fn improve(layout: &mut Layout<'_>, watch: &Watch) -> Result<usize, C
         for cell in layout.cells().collect::<Vec<_>>() {
             watch.check()?;
             if layout.exists(cell) {
-                edits += usize::from(best(layout, proposals(layout, cell)));
+                edits += usize::from(best(layout, proposals(layout, cell), memory));
             }
         }
         total += edits;
@@ -31,11 +31,17 @@ pub(super) fn improve(layout: &mut Layout<'_>, watch: &Watch) -> Result<usize, C
 }
 
 /// Carries out the first of the proposals, best first, that lowers the cost and can be embedded.
-fn best(layout: &mut Layout<'_>, proposals: Vec<Proposal>) -> bool {
+fn best(layout: &mut Layout<'_>, proposals: Vec<Proposal>, memory: &mut Memory) -> bool {
     let mut ranked: Vec<(f64, Proposal)> = proposals.into_iter().map(|p| (layout.gain(&p), p)).collect();
-    ranked.retain(|(gain, _)| *gain < LESS);
+    ranked.retain(|(gain, proposal)| *gain < LESS && !memory.refused.contains(proposal));
     ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
-    ranked.iter().any(|(_, proposal)| layout.carry_out(proposal, LEAST).is_some())
+    for (_, proposal) in ranked {
+        if layout.carry_out(&proposal, LEAST).is_some() {
+            return true;
+        }
+        memory.refused.insert(proposal);
+    }
+    false
 }
 
 /// Everything that can be done to a cell and its surroundings.

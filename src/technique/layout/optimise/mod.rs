@@ -10,11 +10,16 @@
 //! IJNME 44, 1999.
 
 mod cavity;
+mod fill;
 mod local;
 mod relax;
 mod triangles;
 
+use rustc_hash::{FxHashMap, FxHashSet};
+
 use super::Layout;
+use super::proposal::Proposal;
+use crate::mesh::VertexId;
 use crate::watch::{Cancelled, Watch};
 
 /// What optimisation did.
@@ -29,6 +34,20 @@ pub struct OptimiseReport {
     /// Cavities filled anew.
     pub cavities: usize,
 }
+
+/// What was tried in vain, and need not be tried again while the cells are the same.
+#[derive(Clone, Debug, Default)]
+struct Memory {
+    /// Proposals that could not be embedded, or not well.
+    refused: FxHashSet<Proposal>,
+    /// Faces of cavities that may still be filled in vain, so that there is an end on shapes that refuse.
+    patience: usize,
+    /// Nodes with the cells round them when they were last moved to their middle.
+    relaxed: FxHashMap<VertexId, Vec<u32>>,
+}
+
+/// So many times all faces of the surface may be filled in vain.
+const PATIENCE: usize = 4;
 
 /// New cells of less quality are refused, unless the old ones were worse.
 const LEAST: f64 = 0.03;
@@ -46,7 +65,7 @@ pub fn polygonise(layout: &mut Layout<'_>, watch: &Watch) -> Result<Vec<u32>, Ca
         if stuck.is_empty() {
             break;
         }
-        layout.relax(1, watch)?;
+        layout.relax(1, &mut Memory::default(), watch)?;
         stuck = layout.make_polygons();
     }
     Ok(stuck)
@@ -60,18 +79,20 @@ pub fn optimise(layout: &mut Layout<'_>, watch: &Watch) -> Result<OptimiseReport
     /// Later rounds hardly find anything.
     const ROUNDS: usize = 10;
     let mut report = OptimiseReport::default();
-    layout.relax(1, watch)?;
+    let patience = PATIENCE * layout.ground.surface.faces.len();
+    let memory = &mut Memory { patience, ..Memory::default() };
+    layout.relax(1, memory, watch)?;
     for _ in 0..ROUNDS {
         let before = report;
         watch.check()?;
         triangles::remove(layout, &mut report, watch)?;
-        report.edits += local::improve(layout, watch)?;
-        report.cavities += cavity::improve(layout, watch)?;
-        layout.relax(1, watch)?;
+        report.edits += local::improve(layout, memory, watch)?;
+        report.cavities += cavity::improve(layout, memory, watch)?;
+        layout.relax(1, memory, watch)?;
         if report == before {
             break;
         }
     }
-    layout.relax(2, watch)?;
+    layout.relax(2, memory, watch)?;
     Ok(report)
 }

@@ -1,5 +1,6 @@
 //! Moves inner nodes to the middle of their neighbours and straightens paths, without a change of connectivity.
 
+use super::Memory;
 use crate::mesh::VertexId;
 use crate::technique::layout::Layout;
 use crate::technique::layout::proposal::Proposal;
@@ -7,12 +8,20 @@ use crate::watch::{Cancelled, Watch};
 
 impl Layout<'_> {
     /// So many rounds over all inner nodes.
-    pub(super) fn relax(&mut self, rounds: usize, watch: &Watch) -> Result<(), Cancelled> {
+    pub(super) fn relax(&mut self, rounds: usize, memory: &mut Memory, watch: &Watch) -> Result<(), Cancelled> {
         for _ in 0..rounds {
             for node in self.inner_nodes() {
                 watch.check()?;
-                if self.is_node(node) {
-                    self.relax_node(node);
+                if !self.is_node(node) {
+                    continue;
+                }
+                let mut cells = self.cells_at(node).to_vec();
+                cells.sort_unstable();
+                let before = memory.relaxed.insert(node, cells);
+                // Straight paths are worth a move by themselves, but only once.
+                let is_first = before.is_none();
+                if before.as_ref() != memory.relaxed.get(&node) {
+                    self.relax_node(node, is_first);
                 }
             }
         }
@@ -25,7 +34,9 @@ impl Layout<'_> {
         nodes.filter(|&v| self.is_node(v) && !self.is_on_border(v)).collect()
     }
 
-    fn relax_node(&mut self, node: VertexId) {
+    fn relax_node(&mut self, node: VertexId, is_first: bool) {
+        /// A move must make up for so much of what shapes lack.
+        const WORTH: f64 = 1e-3;
         let cells = self.cells_at(node).to_vec();
         if cells.len() < 3 {
             return;
@@ -44,7 +55,7 @@ impl Layout<'_> {
         let faces = cells.iter().map(|&c| self.nodes(c)).collect();
         let proposal = Proposal { cells, faces };
         let Some(undo) = self.carry_out(&proposal, f64::NEG_INFINITY) else { return };
-        if lack(self, &undo.made) > before {
+        if lack(self, &undo.made) > before - if is_first { 0.0 } else { WORTH } {
             self.undo(undo);
         }
     }

@@ -1,0 +1,271 @@
+//! Quads over a loop of nodes with as few irregular nodes as its corners allow.
+//!
+//! A loop of four sides takes a grid, one of three or five sides a grid at each corner, all round one node. Where the
+//! lengths of the sides forbid that, or where there are two or six corners, a straight row cuts the loop in two that
+//! each take such a patch: a node of three and one of five quads make up for sides that differ.
+
+use crate::mesh::VertexId;
+use crate::technique::layout::proposal::new_node;
+
+/// Polygons, said by nodes.
+pub(super) type Faces = Vec<Vec<VertexId>>;
+
+/// A loop of nodes, counter-clockwise, with the places of its corners in rising order.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Outline {
+    pub(super) nodes: Vec<VertexId>,
+    pub(super) corners: Vec<usize>,
+}
+
+/// A straight row across a loop: between which places, and of how many edges.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Cut {
+    pub(super) from: usize,
+    pub(super) to: usize,
+    pub(super) edges: usize,
+}
+
+impl Outline {
+    /// The edges of each side; the first begins at the first corner.
+    fn sides(&self) -> Vec<usize> {
+        let (n, all) = (self.corners.len(), self.nodes.len());
+        (0..n).map(|i| (self.corners[(i + 1) % n] + all - 1 - self.corners[i]) % all + 1).collect()
+    }
+
+    /// One regular patch. `fresh` counts the nodes that are new.
+    pub(super) fn whole(&self, fresh: &mut usize) -> Option<Faces> {
+        let sides = self.sides();
+        let start = *self.corners.first()?;
+        let at = |k: usize| self.nodes[(start + k) % self.nodes.len()];
+        match sides[..] {
+            [a, b, c, d] => (a == c && b == d).then(|| grid(a, b, at, fresh)),
+            [_, _, _] | [_, _, _, _, _] => {
+                let spokes = spokes(&sides)?;
+                let all = self.nodes.len();
+                let places: Vec<usize> = self.corners.iter().map(|&c| (c + all - start) % all).collect();
+                Some(star(&spokes, &places, all, at, fresh))
+            }
+            _ => None,
+        }
+    }
+
+    /// The rows that leave a regular patch on both sides, among those as long as `lengths` tells for their ends.
+    pub(super) fn cuts(&self, lengths: impl Fn(VertexId, VertexId) -> [usize; 2]) -> Vec<Cut> {
+        // How many corners the row leaves on one side; each part gets two more from the row's ends.
+        let beside: &[usize] = match self.corners.len() {
+            2 => &[1],
+            4 => &[1, 3],
+            6 => &[3],
+            _ => return Vec::new(),
+        };
+        let inner: Vec<usize> = (0..self.nodes.len()).filter(|k| self.corners.binary_search(k).is_err()).collect();
+        let mut all = Vec::new();
+        for (i, &from) in inner.iter().enumerate() {
+            for &to in &inner[i + 1..] {
+                let between = self.corners.iter().filter(|&&c| from < c && c < to).count();
+                if !beside.contains(&between) {
+                    continue;
+                }
+                let [least, most] = lengths(self.nodes[from], self.nodes[to]);
+                for edges in least.max(1)..=most {
+                    let cut = Cut { from, to, edges };
+                    if [[from, to], [to, from]].iter().all(|&ends| spokes(&self.sides_beside(ends, edges)).is_some()) {
+                        all.push(cut);
+                    }
+                }
+            }
+        }
+        all
+    }
+
+    /// The sides of the part between two places and a row of so many edges back.
+    fn sides_beside(&self, [first, last]: [usize; 2], edges: usize) -> Vec<usize> {
+        let all = self.nodes.len();
+        let steps = (last + all - first) % all;
+        let mut ends: Vec<usize> =
+            self.corners.iter().map(|&c| (c + all - first) % all).filter(|&c| c < steps).collect();
+        ends.push(steps);
+        ends.sort_unstable();
+        let mut sides = vec![ends[0]];
+        sides.extend(ends.windows(2).map(|w| w[1] - w[0]));
+        sides.push(edges);
+        sides
+    }
+
+    /// The loops on both sides of a row.
+    fn parts(&self, cut: Cut, fresh: &mut usize) -> [Self; 2] {
+        let Cut { from, to, edges } = cut;
+        let row: Vec<VertexId> = (*fresh..*fresh + edges - 1).map(new_node).collect();
+        *fresh += edges - 1;
+        let all = self.nodes.len();
+        let part = |first: usize, last: usize, back: &mut dyn Iterator<Item = VertexId>| {
+            let steps = (last + all - first) % all;
+            let mut nodes: Vec<VertexId> = (0..=steps).map(|k| self.nodes[(first + k) % all]).collect();
+            let mut corners: Vec<usize> = self.corners.iter().map(|&c| (c + all - first) % all).collect();
+            corners.retain(|&c| c < steps);
+            corners.extend([0, steps]);
+            corners.sort_unstable();
+            nodes.extend(back);
+            Self { nodes, corners }
+        };
+        [part(from, to, &mut row.iter().rev().copied()), part(to, from, &mut row.iter().copied())]
+    }
+
+    /// Two regular patches beside a row.
+    pub(super) fn in_two(&self, cut: Cut) -> Option<Faces> {
+        let mut fresh = 0;
+        let [one, other] = self.parts(cut, &mut fresh);
+        let mut faces = one.whole(&mut fresh)?;
+        faces.extend(other.whole(&mut fresh)?);
+        Some(faces)
+    }
+}
+
+fn grid(a: usize, b: usize, rim: impl Fn(usize) -> VertexId, fresh: &mut usize) -> Faces {
+    let first = *fresh;
+    *fresh += (a - 1) * (b - 1);
+    let node = |i: usize, j: usize| {
+        if j == 0 {
+            rim(i)
+        } else if i == a {
+            rim(a + j)
+        } else if j == b {
+            rim(2 * a + b - i)
+        } else if i == 0 {
+            rim(2 * (a + b) - j)
+        } else {
+            new_node(first + (j - 1) * (a - 1) + i - 1)
+        }
+    };
+    let quads = (0..a * b).map(|q| (q % a, q / a));
+    quads.map(|(i, j)| vec![node(i, j), node(i + 1, j), node(i + 1, j + 1), node(i, j + 1)]).collect()
+}
+
+/// The lengths of the spokes of a patch of three or five sides: side `i` is as long as the spokes `i - 1` and `i + 1`.
+fn spokes(sides: &[usize]) -> Option<Vec<usize>> {
+    let n = sides.len();
+    let along = |j: usize| sides[(2 * j + 1) % n] as i64;
+    let twice: i64 = (0..n).map(|j| if j % 2 == 0 { along(j) } else { -along(j) }).sum();
+    let mut spokes = vec![0; n];
+    let mut length = (twice % 2 == 0).then_some(twice / 2)?;
+    for j in 0..n {
+        spokes[(2 * j) % n] = usize::try_from(length).ok().filter(|&l| l >= 1)?;
+        length = along(j) - length;
+    }
+    Some(spokes)
+}
+
+/// A grid at each corner, all round a central node. `places` are the corners on the rim.
+fn star(
+    spokes: &[usize],
+    places: &[usize],
+    rim_len: usize,
+    rim: impl Fn(usize) -> VertexId,
+    fresh: &mut usize,
+) -> Faces {
+    let n = spokes.len();
+    // New nodes: the centre, then those on spokes, then those inside the grids.
+    let centre = *fresh;
+    let mut first = vec![centre + 1];
+    for &s in spokes {
+        first.push(first[first.len() - 1] + s - 1);
+    }
+    let mut inside = first[n];
+    let mut faces = Vec::new();
+    for i in 0..n {
+        let before = (i + n - 1) % n;
+        let (p, s) = (spokes[before], spokes[i]);
+        let base = inside;
+        inside += (p - 1) * (s - 1);
+        let node = |u: usize, v: usize| {
+            if v == 0 {
+                rim((places[i] + u) % rim_len)
+            } else if u == 0 {
+                rim((places[i] + rim_len - v) % rim_len)
+            } else if u == p && v == s {
+                new_node(centre)
+            } else if u == p {
+                new_node(first[i] + v - 1)
+            } else if v == s {
+                new_node(first[before] + u - 1)
+            } else {
+                new_node(base + (v - 1) * (p - 1) + u - 1)
+            }
+        };
+        for (u, v) in (0..p * s).map(|q| (q % p, q / p)) {
+            faces.push(vec![node(u, v), node(u + 1, v), node(u + 1, v + 1), node(u, v + 1)]);
+        }
+    }
+    *fresh = inside;
+    faces
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+
+    use super::*;
+
+    fn outline(sides: &[usize]) -> Outline {
+        let total = sides.iter().sum();
+        let mut corners = vec![0];
+        for side in &sides[..sides.len() - 1] {
+            corners.push(corners[corners.len() - 1] + side);
+        }
+        Outline { nodes: (0..total).map(VertexId::new).collect(), corners }
+    }
+
+    /// Checks that nodes on the rim have one quad at corners and two elsewhere; how many quads irregular ones have.
+    fn irregular(outline: &Outline, faces: &Faces) -> Vec<usize> {
+        let mut counts: BTreeMap<VertexId, usize> = BTreeMap::new();
+        assert!(faces.iter().all(|f| f.len() == 4));
+        faces.iter().flatten().for_each(|&v| *counts.entry(v).or_default() += 1);
+        let mut odd = Vec::new();
+        for (v, count) in counts {
+            match outline.nodes.iter().position(|&w| w == v) {
+                Some(place) => assert_eq!(count, if outline.corners.contains(&place) { 1 } else { 2 }, "{v:?}"),
+                None if count != 4 => odd.push(count),
+                None => {}
+            }
+        }
+        odd.sort_unstable();
+        odd
+    }
+
+    #[test]
+    fn patches_of_three_four_and_five_sides_are_regular_but_for_the_centre() {
+        let cases: [(&[usize], &[usize]); 4] =
+            [(&[4, 4, 4], &[3]), (&[3, 2, 3, 2], &[]), (&[2, 3, 4, 3, 4], &[5]), (&[6, 4, 4], &[3])];
+        for (sides, centre) in cases {
+            let outline = outline(sides);
+            let faces = outline.whole(&mut 0).expect("a patch");
+            assert_eq!(irregular(&outline, &faces), centre, "{sides:?}");
+        }
+        assert_eq!(outline(&[2, 1, 1, 2]).whole(&mut 0), None, "opposite sides differ");
+    }
+
+    #[test]
+    fn sides_that_differ_take_one_node_of_three_and_one_of_five_quads() {
+        let cases: [(&[usize], &[usize]); 5] = [
+            (&[4, 3, 2, 3], &[3, 5]),
+            (&[4, 4, 3, 3], &[3, 5]),
+            (&[7, 5, 3, 5], &[3, 5]),
+            (&[4, 4], &[3, 3]),
+            (&[2, 2, 2, 2, 2, 2], &[5, 5]),
+        ];
+        for (sides, odd) in cases {
+            let outline = outline(sides);
+            let cuts = outline.cuts(|_, _| [1, 8]);
+            assert!(!cuts.is_empty(), "{sides:?}");
+            for cut in cuts {
+                let faces = outline.in_two(cut).expect("two patches");
+                assert_eq!(irregular(&outline, &faces), odd, "{sides:?} {cut:?}");
+                let sides = faces.len() * 4 - outline.nodes.len();
+                let mut nodes: Vec<VertexId> = faces.concat();
+                nodes.sort_unstable();
+                nodes.dedup();
+                assert_eq!(nodes.len() + faces.len(), sides / 2 + outline.nodes.len() + 1, "Euler's formula");
+            }
+        }
+    }
+}
