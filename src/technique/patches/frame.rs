@@ -1,11 +1,11 @@
 //! The elements of a quad mesh on their surface: common paths as arcs, and the vertices that each element covers.
 
-use rustc_hash::FxHashMap;
+use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::mesh::carried::{EdgeKey, edge_key};
 use crate::mesh::geometry::angle;
 use crate::mesh::{Cover, FaceId, IdVec, MarkCause, Quads, Surface, VertexId};
-use crate::technique::layout::{Ground, Layout};
+use crate::technique::layout::{Ground, Layout, cut_again};
 
 /// Why quads and a surface do not belong together.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -42,7 +42,28 @@ pub(super) struct Frame<'g> {
     pub(super) sides: Vec<Vec<(usize, bool)>>,
 }
 
-/// Finds the paths between the elements.
+impl Frame<'_> {
+    /// The elements that share a node with one of these, and these.
+    pub(super) fn beside(&self, chosen: &[bool]) -> Vec<bool> {
+        let nodes = |e: usize| self.layout.ring(e as u32).iter().map(|corner| corner.node);
+        let touched: FxHashSet<VertexId> = (0..chosen.len()).filter(|&e| chosen[e]).flat_map(nodes).collect();
+        (0..chosen.len()).map(|e| nodes(e).any(|v| touched.contains(&v))).collect()
+    }
+}
+
+/// The surface that the elements cover: the one given, cut finer where they had no room.
+///
+/// # Errors
+/// See [`FrameError`].
+pub(super) fn covered(surface: &Surface, quads: &Quads) -> Result<Surface, FrameError> {
+    let cover = quads.cover.as_ref().ok_or(FrameError::NoCover)?;
+    if cover.surface != surface.shape_hash() {
+        return Err(FrameError::OtherSurface);
+    }
+    cut_again(surface, &cover.cuts).ok_or(FrameError::OtherSurface)
+}
+
+/// Finds the paths between the elements on what they cover.
 ///
 /// # Errors
 /// See [`FrameError`].
@@ -100,7 +121,7 @@ fn is_smooth(ground: &Ground<'_>, path: &[VertexId]) -> bool {
 fn embed<'g>(ground: &'g Ground<'g>, quads: &Quads, cover: &Cover) -> Result<Layout<'g>, FrameError> {
     let surface: &Surface = ground.surface;
     let count = quads.mesh.faces.len();
-    if cover.surface != surface.shape_hash() || cover.faces.len() != count {
+    if cover.faces.len() != count {
         return Err(FrameError::OtherSurface);
     }
     let mut cell = IdVec::filled(u32::MAX, surface.faces.len());
