@@ -11,6 +11,9 @@
 //! Based on: T. Itoh, A. Yamada, T. Furuhata, K. Inoue, K. Shimada. Rough Quadrilateralation of Triangular Meshes via
 //! Belt-like Subregioning for Surface Reconstruction. IBM Research Report RT0354, 2000.
 //!
+//! Where elements do not fit between the edges of the mesh, faces there are cut in four and the belts made again; the
+//! cover says which ones, so that nobody needs the finer mesh.
+//!
 //! # Invariants
 //! - Nodes are vertices of the surface, edges are paths over its edges, and paths never cross.
 //! - Every face is covered once; what an element covers is a disk with the element's corners on its rim.
@@ -25,7 +28,8 @@
 //!   thickness asked for; the graph then merges what is left over.
 //! - Elements are bounded by paths over edges. A connector is the path that hugs the straight walk, and of a fan every
 //!   second spoke is drawn, as if its triangles were coupled at once: few edges meet in a vertex.
-//! - Closed surfaces, which the paper leaves open, are cut along the borders of their regions and along marked edges.
+//! - Closed surfaces, which the paper leaves open, are cut along the borders of their regions. The nodes there are dealt
+//!   out first, so that every region has an even number of them: an odd one leaves a triangle.
 
 use std::sync::Arc;
 
@@ -41,12 +45,13 @@ use crate::step::{
 };
 use crate::technique::belts::{BeltReport, BeltRules, Order, Thickness, cut_belts};
 use crate::technique::layout::optimise::{OptimiseReport, optimise, polygonise};
-use crate::technique::layout::{Ground, Layout, to_quads};
+use crate::technique::layout::{Ground, Layout, Room, to_quads, with_rings};
 use crate::watch::{Cancelled, Watch};
 
 /// Cuts a surface into coarse quads that follow its borders, each with the faces that it covers.
 ///
-/// The surface must be fine: ten edges or more along an element, see `refine`. A closed surface must have regions.
+/// The surface should be fine: ten edges or more along an element, see `refine`; where it has no room for an element its
+/// faces are cut in four. A closed surface must have regions.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default, rename_all = "kebab-case")]
 pub struct RoughQuadsParams {
@@ -89,6 +94,8 @@ impl Default for RoughQuadsParams {
 pub struct RoughQuadsStats {
     /// Regions, or parts between marked edges, that were cut each on its own.
     pub domains: usize,
+    /// Faces that were cut in four first, because elements did not fit between their edges.
+    pub cut_faces: usize,
     /// Strips of triangles.
     pub strips: usize,
     /// Belts that the strips were merged into.
@@ -154,16 +161,40 @@ pub fn rough_quads(
     params: &RoughQuadsParams,
     watch: &Watch,
 ) -> Result<(Quads, RoughQuadsStats), RoughQuadsError> {
-    let ground = Ground::new(surface);
     let rules = rules(surface, params)?;
-    check_borders(&ground)?;
-    let made =
-        if params.optimize { best(&ground, &rules, params, watch)? } else { attempt(&ground, &rules, params, watch)? };
-    let quads = made.quads;
+    let mut room = Room::new(surface);
+    loop {
+        let ground = Ground::new(&room.surface);
+        check_borders(&ground)?;
+        let made = if params.optimize {
+            best(&ground, &rules, params, watch)?
+        } else {
+            attempt(&ground, &rules, params, watch)?
+        };
+        match made {
+            Ok(made) => return Ok(finish(surface, &ground, made, &room)),
+            Err(narrow) => {
+                let places = room.origins(&narrow.places);
+                let around = with_rings(&ground, &narrow.around);
+                if !room.cut(around)? {
+                    return Err(RoughQuadsError::TooCoarse { faces: places });
+                }
+            }
+        }
+    }
+}
+
+fn finish(surface: &Surface, ground: &Ground<'_>, made: Attempt, room: &Room) -> (Quads, RoughQuadsStats) {
+    let mut quads = made.quads;
+    if let Some(cover) = &mut quads.cover {
+        cover.surface = surface.shape_hash();
+        cover.cuts = room.cuts.clone();
+    }
     let Counts { triangles, irregular, forced, vertices } = made.counts;
     let elements = quads.mesh.faces.len();
     let stats = RoughQuadsStats {
         domains: ground.domains,
+        cut_faces: room.cuts.iter().map(Vec::len).sum(),
         strips: made.belts.strips,
         belts: made.belts.belts,
         connectors: made.belts.connectors,
@@ -177,7 +208,15 @@ pub fn rough_quads(
         irregular_share: irregular.len() as f64 / vertices.max(1) as f64,
         forced_share: forced as f64 / vertices.max(1) as f64,
     };
-    Ok((quads, stats))
+    (quads, stats)
+}
+
+/// Where elements do not fit between the edges of the mesh.
+struct Narrow {
+    /// A face at each place.
+    places: Vec<FaceId>,
+    /// The faces that would have to be smaller.
+    around: Vec<FaceId>,
 }
 
 /// Quads made by one order of the belts.
@@ -194,53 +233,68 @@ fn attempt(
     rules: &BeltRules,
     params: &RoughQuadsParams,
     watch: &Watch,
-) -> Result<Attempt, RoughQuadsError> {
+) -> Result<Result<Attempt, Narrow>, Cancelled> {
     let (mut layout, bad, belts) = cut_belts(ground, rules, watch)?;
+    if !bad.is_empty() {
+        return Ok(Err(narrow(&layout, bad.iter().map(|b| b.cell))));
+    }
     let mut stuck = polygonise(&mut layout, watch)?;
+    if !stuck.is_empty() {
+        return Ok(Err(narrow(&layout, stuck.into_iter())));
+    }
     let mut post_processed = layout.couple_triangles() + layout.open_triangles();
     post_processed += layout.couple_triangles();
-    refuse(bad.iter().map(|b| b.face).collect())?;
     let mut report = OptimiseReport::default();
     if params.optimize {
         report = optimise(&mut layout, watch)?;
         stuck = polygonise(&mut layout, watch)?;
     }
     part_parallels(&mut layout, &mut stuck, watch)?;
-    refuse(stuck_faces(&layout, &stuck))?;
+    let odd = layout.cells().filter(|&c| !(3..=4).contains(&layout.ring(c).len()));
+    let left: Vec<u32> = stuck.into_iter().filter(|&c| layout.exists(c)).chain(odd).collect();
+    if !left.is_empty() {
+        return Ok(Err(narrow(&layout, left.into_iter())));
+    }
     let quads = to_quads(&layout);
     let counts = layout_counts(&quads.mesh);
-    Ok(Attempt { quads, counts, belts, post_processed, report })
+    Ok(Ok(Attempt { quads, counts, belts, post_processed, report }))
 }
 
-/// The best of several ways to cut the belts; the first that is good enough ends the search.
+/// These cells, which are too narrow, with what lies round them.
+fn narrow(layout: &Layout<'_>, cells: impl Iterator<Item = u32>) -> Narrow {
+    let mut cells: Vec<u32> = cells.collect();
+    cells.sort_unstable();
+    cells.dedup();
+    let mut places: Vec<FaceId> = cells.iter().filter_map(|&c| layout.faces(c).iter().min().copied()).collect();
+    places.sort_unstable();
+    Narrow { places, around: cells.iter().flat_map(|&c| layout.faces(c)).copied().collect() }
+}
+
+/// The best of several ways to cut the belts; the first that is good enough ends the search, and so does the first one
+/// where it finds no room.
 fn best(
     ground: &Ground<'_>,
     rules: &BeltRules,
     params: &RoughQuadsParams,
     watch: &Watch,
-) -> Result<Attempt, RoughQuadsError> {
-    const WAYS: [(Order, f64); 4] =
-        [(Order::FromOutside, SNAP), (Order::FromBorders, 0.5), (Order::FromOutside, 0.5), (Order::FromBorders, SNAP)];
-    let mut found: Option<Result<Attempt, RoughQuadsError>> = None;
-    for (order, snap) in WAYS {
-        let made = attempt(ground, &BeltRules { order, snap, ..*rules }, params, watch);
-        if let Err(RoughQuadsError::Cancelled(cancelled)) = made {
-            return Err(cancelled.into());
-        }
-        let is_better = match (&made, &found) {
-            (_, None) | (Ok(_), Some(Err(_))) => true,
-            (Ok(made), Some(Ok(found))) => made.shares() < found.shares(),
-            (Err(_), Some(_)) => false,
-        };
-        let is_good = made.as_ref().is_ok_and(Attempt::is_good);
-        if is_better {
-            found = Some(made);
-        }
-        if is_good {
+) -> Result<Result<Attempt, Narrow>, Cancelled> {
+    const OTHERS: [(Order, f64); 3] =
+        [(Order::FromBorders, 0.5), (Order::FromOutside, 0.5), (Order::FromBorders, SNAP)];
+    let mut best = match attempt(ground, rules, params, watch)? {
+        Ok(made) => made,
+        Err(narrow) => return Ok(Err(narrow)),
+    };
+    for (order, snap) in OTHERS {
+        if best.is_good() {
             break;
         }
+        if let Ok(made) = attempt(ground, &BeltRules { order, snap, ..*rules }, params, watch)?
+            && made.shares() < best.shares()
+        {
+            best = made;
+        }
     }
-    found.unwrap_or(Err(RoughQuadsError::TooCoarse { faces: Vec::new() }))
+    Ok(Ok(best))
 }
 
 impl Attempt {
@@ -313,22 +367,6 @@ fn check_borders(ground: &Ground<'_>) -> Result<(), RoughQuadsError> {
     closed.map_or(Ok(()), |(face, _)| Err(RoughQuadsError::NoBorder { face }))
 }
 
-fn refuse(mut faces: Vec<FaceId>) -> Result<(), RoughQuadsError> {
-    faces.sort_unstable();
-    faces.dedup();
-    if faces.is_empty() { Ok(()) } else { Err(RoughQuadsError::TooCoarse { faces }) }
-}
-
-/// A face of each cell that is neither a triangle nor a quad.
-fn stuck_faces(layout: &Layout<'_>, stuck: &[u32]) -> Vec<FaceId> {
-    let left = stuck.iter().copied().filter(|&c| layout.exists(c));
-    let odd = layout.cells().filter(|&c| !(3..=4).contains(&layout.ring(c).len()));
-    left.chain(odd)
-        .filter(|&c| !(3..=4).contains(&layout.ring(c).len()))
-        .filter_map(|c| layout.faces(c).first().copied())
-        .collect()
-}
-
 impl RoughQuadsError {
     fn failure(self, surface: &Surface) -> StepFailure {
         let message = self.to_string();
@@ -356,7 +394,7 @@ pub struct Step;
 
 impl StepContract for Step {
     const NAME: &'static str = "rough-quads";
-    const REVISION: u32 = 2;
+    const REVISION: u32 = 3;
     const INPUTS: &'static [InputDef] = &[InputDef {
         name: "from",
         accepts: &[Port::Surface],

@@ -4,6 +4,7 @@ use glam::dvec3;
 use meshmill::mesh::topology::{EdgeTable, components, euler_characteristic};
 use meshmill::mesh::{Facet, Id, Quads, Regions, Soup, Surface};
 use meshmill::step::Artifact;
+use meshmill::technique::layout::cut_again;
 
 use super::golden::golden;
 use crate::shapes;
@@ -59,8 +60,11 @@ fn quads(artifact: &Artifact) -> &Quads {
 }
 
 /// A conforming complex of the surface's Euler number, whose elements cover every face once, each a connected set.
-fn check(from: &Surface, made: &Quads) {
+fn check(surface: &Surface, made: &Quads) {
     let mesh = &made.mesh;
+    let cuts = &made.cover.as_ref().unwrap().cuts;
+    let from = &cut_again(surface, cuts).expect("the cuts belong to the surface");
+    assert_eq!(cuts.is_empty(), from.faces.len() == surface.faces.len());
     let edges = EdgeTable::new(mesh);
     assert!(edges.iter().all(|(_, _, sides)| sides.len() <= 2), "an edge has three elements");
     let opposed = |sides: &[meshmill::mesh::topology::SideRef]| sides[0].is_forward != sides[1].is_forward;
@@ -68,7 +72,7 @@ fn check(from: &Surface, made: &Quads) {
     assert_eq!(euler_characteristic(mesh, &edges), euler_characteristic(from, &EdgeTable::new(from)));
     assert_eq!(components(mesh).count, components(from).count);
     let cover = made.cover.as_ref().unwrap();
-    assert_eq!(cover.surface, from.shape_hash());
+    assert_eq!(cover.surface, surface.shape_hash());
     let mut covered: Vec<_> = cover.faces.iter().flatten().copied().collect();
     covered.sort_unstable();
     assert_eq!(covered, from.faces.ids().collect::<Vec<_>>(), "each face is covered once");
@@ -121,6 +125,21 @@ fn every_mode_gives_a_complex_on_plates_with_corners_and_holes() {
                 assert!(share(&made.stats, "triangle-share") <= 0.05, "{}", made.stats);
             }
         }
+    }
+}
+
+#[test]
+fn a_mesh_too_coarse_for_its_elements_is_cut_where_it_has_to_be() {
+    // A hole of one cell, whose border is shorter than an element, and edges hardly shorter than the elements.
+    let from = plate(9, |x, y| (x - 0.5).abs() > 0.06 || (y - 0.5).abs() > 0.06);
+    for optimize in [false, true] {
+        let params = format!("interval = 0.15, optimize = {optimize}");
+        let made = run("rough-quads", &params, &surface(from.clone()));
+        check(&from, quads(&made.artifact));
+        assert!(made.stats["cut-faces"].as_u64() > Some(0), "{}", made.stats);
+        let given = [("from", made.artifact), ("surface", surface(from.clone()))];
+        let fitted = run_locked("fit-patches", "main", "", "", &given).unwrap();
+        assert_eq!(fitted.stats["patches-beyond"], 0, "{}", fitted.stats);
     }
 }
 
