@@ -37,7 +37,7 @@ pub(super) fn settle(ground: &Ground<'_>, node: &mut IdVec<Vertex, bool>, interv
         return settled;
     }
     let (mut stretches, is_free) = stretches(ground, node, interval);
-    pair_odd(&mut stretches, is_free);
+    pair_odd(&mut stretches, &is_free);
     for stretch in &stretches {
         settled.extend(stretch.vertices.windows(2).map(|w| edge_key(w[0], w[1])));
         for part in 1..stretch.parts[0] {
@@ -97,7 +97,7 @@ impl Stretch {
 }
 
 /// Changes stretches until no domain is odd but the free ones.
-fn pair_odd(stretches: &mut [Stretch], is_free: Vec<bool>) {
+fn pair_odd(stretches: &mut [Stretch], is_free: &[bool]) {
     let mut at: Vec<Vec<usize>> = vec![Vec::new(); is_free.len()];
     let mut is_odd = vec![false; is_free.len()];
     for (k, stretch) in stretches.iter().enumerate() {
@@ -175,7 +175,7 @@ mod tests {
         };
         for (outside, changed) in [(1.0, vec![0, 1]), (0.01, vec![2, 4])] {
             let mut stretches = row(outside);
-            pair_odd(&mut stretches, vec![false, false, false, true]);
+            pair_odd(&mut stretches, &[false, false, false, true]);
             let now: Vec<usize> = (0..5).filter(|&k| stretches[k].parts[0] != row(outside)[k].parts[0]).collect();
             assert_eq!(now, changed);
             for domain in 0..3 {

@@ -69,7 +69,9 @@ pub fn with_rings(ground: &Ground<'_>, faces: &[FaceId]) -> Vec<FaceId> {
     let mut chosen: FxHashSet<FaceId> = faces.iter().copied().collect();
     let mut front: Vec<FaceId> = faces.to_vec();
     for _ in 0..RINGS {
-        let corners: FxHashSet<VertexId> = front.iter().flat_map(|&f| ground.surface.faces[f]).collect();
+        let mut corners: Vec<VertexId> = front.iter().flat_map(|&f| ground.surface.faces[f]).collect();
+        corners.sort_unstable();
+        corners.dedup();
         let beside = corners.iter().flat_map(|&v| ground.faces_at.of(v)).copied();
         front = beside.filter(|&f| chosen.insert(f)).collect();
     }

@@ -139,9 +139,9 @@ impl Layout<'_> {
     /// Carries a proposal out; `None`, and nothing changed, where it is no disk or there is no room, or where a new cell
     /// would be worse than `least` and worse than the old ones.
     pub fn carry_out(&mut self, proposal: &Proposal, least: f64) -> Option<Undo> {
-        let rim = self.rim(&proposal.cells)?;
         /// Fewer cells are nearly flat; what is relaxed keeps its connectivity and must not stay where it is.
         const BENT: usize = 8;
+        let rim = self.rim(&proposal.cells)?;
         let flat = (proposal.cells.len() > BENT).then(|| Flat::new(self, &proposal.cells, &rim));
         let pattern = self.pattern(&rim, &proposal.faces, flat.as_ref());
         self.fill(&proposal.cells, &rim, &pattern, least)

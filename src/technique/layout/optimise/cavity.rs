@@ -4,6 +4,8 @@
 //! a polygon of two to six sides it may be filled by the patches of `fill`. So irregular nodes that lie apart cancel
 //! each other out, and of many that make up for one another two are left.
 
+use std::collections::BTreeMap;
+
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use super::fill::{Cut, Faces, Outline};
@@ -122,16 +124,16 @@ struct Cavity {
     cells: Vec<u32>,
     is_inside: FxHashSet<u32>,
     /// How many cells inside each node has.
-    nodes: FxHashMap<VertexId, usize>,
+    nodes: BTreeMap<VertexId, usize>,
     /// Cells beside the cavity, with the number of common edges.
-    beside: FxHashMap<u32, i32>,
+    beside: BTreeMap<u32, i32>,
 }
 
 impl Cavity {
     fn new(layout: &Layout<'_>, cells: Vec<u32>) -> Option<Self> {
         layout.rim(&cells)?;
         let domain = layout.domain(*cells.first()?);
-        let (is_inside, nodes, beside) = (FxHashSet::default(), FxHashMap::default(), FxHashMap::default());
+        let (is_inside, nodes, beside) = (FxHashSet::default(), BTreeMap::new(), BTreeMap::new());
         let mut cavity = Self { domain, cells: Vec::new(), is_inside, nodes, beside };
         cells.into_iter().for_each(|cell| cavity.add(layout, cell));
         Some(cavity)
@@ -166,7 +168,6 @@ impl Cavity {
                 return None;
             }
             corners += usize::from(turn.is_some_and(|turn| turn < 2));
-            // Whole and half numbers: the order of the sum does not matter.
             cost += layout.strain(node, self.domain, layout.patches(node, self.domain));
         }
         if !(2..=6).contains(&corners) {
@@ -215,7 +216,7 @@ impl Cavity {
     fn next_cell(&self, layout: &Layout<'_>) -> Option<u32> {
         /// Neighbours tried.
         const CHOICES: usize = 8;
-        let mut scores: FxHashMap<u32, i32> = self.beside.iter().map(|(&c, &common)| (c, 10 * common)).collect();
+        let mut scores: BTreeMap<u32, i32> = self.beside.iter().map(|(&c, &common)| (c, 10 * common)).collect();
         for (&node, &inside) in &self.nodes {
             let Some(turn) = self.turn(layout, node, inside) else { continue };
             for cell in layout.cells_at(node) {
