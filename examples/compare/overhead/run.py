@@ -106,7 +106,7 @@ def measure(name, count, binary, limit):
         first = timed(command, folder, limit)
         if first is None:
             made = len(list((folder / "out").iterdir()))
-            return [name, f"> {limit} ({made} done)", "", "", "", "", ""]
+            return [name, f"> {limit} ({made} done)", "", "", "", "", "", ""]
         time.sleep(3)
         idle = [timed(command, folder, limit) for _ in range(3)]
         (folder / "in" / "0.obj").write_text(MESH.format(-1))
@@ -120,6 +120,7 @@ def measure(name, count, binary, limit):
         f"{statistics.median(run[0] for run in idle) * 1000:.0f}",
         f"{statistics.median(run[1] for run in idle) * 1000:.0f}",
         f"{changed[0] * 1000:.0f}",
+        f"{changed[1] * 1000:.0f}",
         f"{max(run[2] for run in [first, *idle]):.0f}",
     ]
 
@@ -131,13 +132,13 @@ def main():
     parser.add_argument("--tools", default=",".join(TOOLS))
     parser.add_argument("--meshmill", default=str(ROOT / "target" / "release" / "meshmill"))
     arguments = parser.parse_args()
-    head = ["tool", "first run s", "processor ms a task", "nothing to do ms", "of it processor ms", "one changed ms", "largest process MB"]
+    head = ["tool", "first run s", "processor ms a task", "nothing to do ms", "of it processor ms", "one changed ms", "of it processor ms", "largest process MB"]
     print("| " + " | ".join(head) + " |")
     print("|" + "---|" * len(head))
     for name in arguments.tools.split(","):
         binary = str(pathlib.Path(arguments.meshmill).resolve()) if name == "meshmill" else shutil.which(name)
         if not binary or not pathlib.Path(binary).exists():
-            print(f"| {name} | not installed | | | | | |")
+            print(f"| {name} | not installed | | | | | | |")
             continue
         print("| " + " | ".join(measure(name, arguments.tasks, binary, arguments.limit)) + " |", flush=True)
 
