@@ -36,7 +36,7 @@ const FAIR: f64 = 0.5;
 /// The sides of faces in the place of a poor one, as a part of its own.
 const ROOM: f64 = 0.7;
 /// Where those are shorter than this part of the size asked for there, that part counts in their stead.
-const LEAST_ROOM: f64 = 0.7;
+const LEAST_ROOM: f64 = 0.35;
 
 /// One run from the surface to clean quads, with all sizes times `scale`.
 pub(super) fn morph(
