@@ -1,6 +1,6 @@
 //! The elements of a quad mesh on their surface: common paths as arcs, and the vertices that each element covers.
 
-use rustc_hash::{FxHashMap, FxHashSet};
+use rustc_hash::FxHashMap;
 
 use crate::mesh::carried::{EdgeKey, edge_key};
 use crate::mesh::geometry::angle;
@@ -40,15 +40,6 @@ pub(super) struct Frame<'g> {
     pub(super) arcs: Vec<Arc>,
     /// For each element and side: the arc, and whether it runs along.
     pub(super) sides: Vec<Vec<(usize, bool)>>,
-}
-
-impl Frame<'_> {
-    /// The elements that share a node with one of these, and these.
-    pub(super) fn beside(&self, chosen: &[bool]) -> Vec<bool> {
-        let nodes = |e: usize| self.layout.ring(e as u32).iter().map(|corner| corner.node);
-        let touched: FxHashSet<VertexId> = (0..chosen.len()).filter(|&e| chosen[e]).flat_map(nodes).collect();
-        (0..chosen.len()).map(|e| nodes(e).any(|v| touched.contains(&v))).collect()
-    }
 }
 
 /// The surface that the elements cover: the one given, cut finer where they had no room.

@@ -3,7 +3,7 @@
 //! The common curves come first, least squares over the path with both ends fixed, so that neighbours share them; then
 //! the control points inside, least squares over the covered vertices with a thin-plate term, whose parameters are then
 //! corrected to the feet of the vertices and the fit repeated. A patch farther from its vertices than the tolerance gets
-//! twice the spans, and those beside it are fitted again. Patches meet in common curves; the angle between their tangent planes is measured. On demand smooth
+//! twice the spans. Patches meet in common curves; the angle between their tangent planes is measured. On demand smooth
 //! seams get a common plane at each of their points: curves leave their nodes in one plane, and the control points next
 //! to a seam are drawn into the mean of the planes of both patches, by the same least squares. That is tangent
 //! continuity within a tolerance, not to the last digit, which bicubic patches round any node cannot have.
@@ -76,37 +76,34 @@ pub fn fit_patches(surface: &Surface, quads: &Quads, rules: &FitRules, watch: &W
     let mut spans = vec![1; frame.sides.len()];
     watch.phase("fit", None);
     let mut fits: Vec<Fit> = (0..frame.sides.len()).into_par_iter().map(|e| begin(&frame, e)).collect();
-    let mut is_open = vec![true; fits.len()];
     loop {
         watch.check()?;
         let mut curves = curves(&frame, &spans, rules);
-        let opened = fits.par_iter_mut().enumerate().filter(|(e, _)| is_open[*e]);
-        opened.for_each(|(e, fit)| fit.solve(&frame, e, spans[e], &curves, rules));
+        fits.par_iter_mut().enumerate().for_each(|(e, fit)| fit.solve(&frame, e, spans[e], &curves, rules));
         if rules.smooth.is_some() {
             watch.check()?;
             level(&frame, &mut curves);
-            smooth(&frame, &mut fits, (&spans, &is_open), &curves, rules);
+            smooth(&frame, &mut fits, &spans, &curves, rules);
         }
-        watch.check()?;
-        measure(&frame, &mut fits, &is_open);
+        let errors = errors(&frame, &fits);
         let bent = bent(&frame, &fits, rules);
         watch.check()?;
-        let mut refined = vec![false; fits.len()];
-        for (e, fit) in fits.iter().enumerate() {
+        let mut refined = false;
+        for (e, error) in errors.iter().enumerate() {
+            fits[e].patch.max_error = error.0;
+            fits[e].patch.rms_error = error.1;
             // With fewer than two vertices for each control point the fit would follow the triangles and swing between.
             let unknown = (2 * spans[e] + 1) * (2 * spans[e] + 1);
-            let has_room = 2 * spans[e] <= rules.max_spans && 2 * unknown <= fit.points.len();
+            let has_room = 2 * spans[e] <= rules.max_spans && 2 * unknown <= fits[e].points.len();
             // More spans follow the facets of a coarse mesh more closely, so bends alone ask for two at most.
-            if (fit.patch.max_error > rules.tolerance || bent[e] && spans[e] == 1) && has_room {
+            if (error.0 > rules.tolerance || bent[e] && spans[e] == 1) && has_room {
                 spans[e] *= 2;
-                refined[e] = true;
+                refined = true;
             }
         }
-        if !refined.contains(&true) {
+        if !refined {
             break;
         }
-        // Curves, and planes at nodes, change for those alone that share a node with a refined element.
-        is_open = frame.beside(&refined);
     }
     let seams = seams(&frame, &fits);
     let patches: Vec<Patch> = fits.into_iter().map(|fit| fit.patch).collect();
@@ -147,31 +144,23 @@ fn level(frame: &Frame<'_>, curves: &mut [Curve]) {
 }
 
 /// Fits the patches again under curves that were levelled, with common planes along smooth seams.
-fn smooth(
-    frame: &Frame<'_>,
-    fits: &mut [Fit],
-    (spans, is_open): (&[usize], &[bool]),
-    curves: &[Curve],
-    rules: &FitRules,
-) {
+fn smooth(frame: &Frame<'_>, fits: &mut [Fit], spans: &[usize], curves: &[Curve], rules: &FitRules) {
     /// Rounds of tangency and corrected parameters.
     const ROUNDS: usize = 3;
-    fits.par_iter_mut().enumerate().filter(|(e, _)| is_open[*e]).for_each(|(e, fit)| {
+    fits.par_iter_mut().enumerate().for_each(|(e, fit)| {
         fit.set_border(frame, e, spans[e], curves);
         fit_inside(&mut fit.patch, &fit.points, &fit.places, rules.fairness);
     });
     // Planes are chosen once: later ones would follow what they made.
     let normals: Vec<Vec<(f64, DVec3)>> =
-        (0..frame.arcs.len()).into_par_iter().map(|arc| seam_normals(frame, fits, is_open, curves, arc)).collect();
+        (0..frame.arcs.len()).into_par_iter().map(|arc| seam_normals(frame, fits, curves, arc)).collect();
     for _ in 0..ROUNDS {
-        let opened = fits.par_iter_mut().enumerate().filter(|(e, _)| is_open[*e]);
-        opened.for_each(|(e, fit)| fit.solve_tangent(frame, e, &normals, rules));
+        fits.par_iter_mut().enumerate().for_each(|(e, fit)| fit.solve_tangent(frame, e, &normals, rules));
     }
 }
 
-/// Along a smooth seam: shares of the curve, with the normal across the curve that is midway between both patches, or
-/// that of the one which is finished.
-fn seam_normals(frame: &Frame<'_>, fits: &[Fit], is_open: &[bool], curves: &[Curve], arc: usize) -> Vec<(f64, DVec3)> {
+/// Along a smooth seam: shares of the curve, with the normal midway between both patches and across the curve.
+fn seam_normals(frame: &Frame<'_>, fits: &[Fit], curves: &[Curve], arc: usize) -> Vec<(f64, DVec3)> {
     if !is_inside(frame, arc) {
         return Vec::new();
     }
@@ -187,9 +176,8 @@ fn seam_normals(frame: &Frame<'_>, fits: &[Fit], is_open: &[bool], curves: &[Cur
     let normal_at = |k: usize| {
         let t = (k as f64 + 0.5) / places as f64;
         let [a, b] = at_seam(frame, arc, t)?;
-        let counts = |e: usize| !is_open[e] || is_open[a.0] && is_open[b.0];
-        let of = |(e, uv): (usize, [f64; 2])| if counts(e) { normal(&fits[e].patch, uv) } else { DVec3::ZERO };
-        Some((t, across(t, of(a) + of(b))?))
+        let [na, nb] = [a, b].map(|(e, uv)| normal(&fits[e].patch, uv));
+        Some((t, across(t, na + nb)?))
     };
     let raw: Vec<(f64, DVec3)> = (0..places).filter_map(normal_at).collect();
     smoothed(&raw).into_iter().filter_map(|(t, normal)| Some((t, across(t, normal)?))).collect()
@@ -350,15 +338,15 @@ fn at_seam(frame: &Frame<'_>, arc: usize, t: f64) -> Option<[(usize, [f64; 2]); 
     Some([place(first), place(second)])
 }
 
-/// Largest and root mean square distance of each open element's vertices from all patches together.
-fn measure(frame: &Frame<'_>, fits: &mut [Fit], is_open: &[bool]) {
+/// Largest and root mean square distance of each element's vertices from all patches together.
+fn errors(frame: &Frame<'_>, fits: &[Fit]) -> Vec<(f64, f64)> {
     /// Elements of the mesh for distances along a side of a patch.
     const FINE: usize = 16;
     let patches: Vec<Patch> = fits.iter().map(|fit| fit.patch.clone()).collect();
     let fine: Soup = sample::tessellate(frame, &patches, FINE);
     let tree = TriangleBvh::of_surface(&sample::triangles(&fine));
     let ground = frame.layout.ground;
-    let of_element = |(e, fit): (usize, &mut Fit)| {
+    let of_element = |(e, fit): (usize, &Fit)| {
         let own = fit.points.iter().zip(&fit.places).map(|(&p, &place)| {
             let [u, v] = fit.patch.foot(p, place);
             let own = fit.patch.point(u, v).distance(p);
@@ -367,29 +355,27 @@ fn measure(frame: &Frame<'_>, fits: &mut [Fit], is_open: &[bool]) {
         let rim = frame.sides[e].iter().flat_map(|&(arc, _)| &frame.arcs[arc].path);
         let rim = rim.map(|&v| tree.closest(ground.point(v)).map_or(0.0, |near| near.distance()));
         let all: Vec<f64> = own.chain(rim).collect();
-        fit.patch.max_error = all.iter().copied().fold(0.0, f64::max);
-        fit.patch.rms_error = crate::metric::summary::rms(&all).unwrap_or(0.0);
+        (all.iter().copied().fold(0.0, f64::max), crate::metric::summary::rms(&all).unwrap_or(0.0))
     };
-    fits.par_iter_mut().enumerate().filter(|(e, _)| is_open[*e]).for_each(of_element);
+    fits.par_iter().enumerate().map(of_element).collect()
 }
 
 /// The angle between the tangent planes along each inner arc.
 fn seams(frame: &Frame<'_>, fits: &[Fit]) -> Vec<Seam> {
-    (0..frame.arcs.len()).filter_map(|arc| seam(frame, fits, arc)).collect()
-}
-
-fn seam(frame: &Frame<'_>, fits: &[Fit], arc: usize) -> Option<Seam> {
     /// Places along a seam where the planes are compared; the ends are common to more than two patches.
     const PLACES: usize = 16;
-    let mut angle = 0.0_f64;
-    let mut pair = None;
-    for k in 1..PLACES {
-        let [a, b] = at_seam(frame, arc, k as f64 / PLACES as f64)?;
-        let normals = [a, b].map(|(e, uv)| normal(&fits[e].patch, uv));
-        // Planes have no sides: at a corner of nearly 180 degrees the order of the derivatives may swap.
-        let between = crate::mesh::geometry::angle(normals[0], normals[1]).to_degrees();
-        angle = angle.max(between.min(180.0 - between));
-        pair = Some([a.0 as u32, b.0 as u32]);
-    }
-    pair.map(|patches| Seam { patches, angle, is_smooth: frame.arcs[arc].is_smooth })
+    let seam = |arc: usize| {
+        let mut angle = 0.0_f64;
+        let mut pair = None;
+        for k in 1..PLACES {
+            let [a, b] = at_seam(frame, arc, k as f64 / PLACES as f64)?;
+            let normals = [a, b].map(|(e, uv)| normal(&fits[e].patch, uv));
+            // Planes have no sides: at a corner of nearly 180 degrees the order of the derivatives may swap.
+            let between = crate::mesh::geometry::angle(normals[0], normals[1]).to_degrees();
+            angle = angle.max(between.min(180.0 - between));
+            pair = Some([a.0 as u32, b.0 as u32]);
+        }
+        pair.map(|patches| Seam { patches, angle, is_smooth: frame.arcs[arc].is_smooth })
+    };
+    (0..frame.arcs.len()).filter_map(seam).collect()
 }
