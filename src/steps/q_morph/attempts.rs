@@ -171,7 +171,7 @@ fn prepare(mesh: &mut Mixed, ground: &Ground<'_>, check: &Check, rules: Rules, w
 /// How much an attempt lacks, in all and by region: 0 where it holds to the tolerance with sound shapes.
 fn lack(mesh: &Mixed, faults: &[Fault], tolerance: f64, regions: usize) -> (f64, Vec<f64>) {
     let (mut broken, mut poorest, mut poor) = (0.0, 0.0_f64, 0.0);
-    let mut by_region = vec![0.0; regions];
+    let (mut by_region, mut poorest_of) = (vec![0.0; regions], vec![0.0_f64; regions]);
     for f in mesh.faces() {
         let quality = mesh.quality(f);
         let short = shortfall(mesh, f);
@@ -179,7 +179,9 @@ fn lack(mesh: &Mixed, faults: &[Fault], tolerance: f64, regions: usize) -> (f64,
         broken += wrong;
         poor += short;
         poorest = poorest.max(short);
-        by_region[mesh.region(f) as usize] += wrong + short;
+        let region = mesh.region(f) as usize;
+        by_region[region] += wrong;
+        poorest_of[region] = poorest_of[region].max(short);
     }
     let (mut worst, mut farthest) = (0.0_f64, vec![0.0_f64; regions]);
     for fault in faults {
@@ -187,8 +189,9 @@ fn lack(mesh: &Mixed, faults: &[Fault], tolerance: f64, regions: usize) -> (f64,
         let far = &mut farthest[mesh.region(fault.face) as usize];
         (worst, *far) = (worst.max(excess), far.max(excess));
     }
-    for (lack, far) in by_region.iter_mut().zip(farthest) {
-        *lack += 4.0 * far;
+    // The poorest only: smaller faces are more faces, and a region is not worse for that.
+    for ((lack, far), poorest) in by_region.iter_mut().zip(farthest).zip(poorest_of) {
+        *lack += 4.0 * far + poorest;
     }
     // Many poor faces are no broken one.
     (broken + 4.0 * worst + poorest + (0.2 * poor).min(2.0), by_region)
