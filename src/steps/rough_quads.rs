@@ -188,7 +188,7 @@ fn finish(surface: &Surface, ground: &Ground<'_>, made: Attempt, room: &Room) ->
     let mut quads = made.quads;
     if let Some(cover) = &mut quads.cover {
         cover.surface = surface.shape_hash();
-        cover.cuts = room.cuts.clone();
+        cover.cuts.clone_from(&room.cuts);
     }
     let Counts { triangles, irregular, forced, vertices } = made.counts;
     let elements = quads.mesh.faces.len();

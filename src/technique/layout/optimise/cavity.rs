@@ -135,7 +135,9 @@ impl Cavity {
         let domain = layout.domain(*cells.first()?);
         let (is_inside, nodes, beside) = (FxHashSet::default(), BTreeMap::new(), BTreeMap::new());
         let mut cavity = Self { domain, cells: Vec::new(), is_inside, nodes, beside };
-        cells.into_iter().for_each(|cell| cavity.add(layout, cell));
+        for cell in cells {
+            cavity.add(layout, cell);
+        }
         Some(cavity)
     }
 
