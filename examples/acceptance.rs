@@ -90,7 +90,10 @@ fn main() -> ExitCode {
     let mut arguments = std::env::args().skip(1);
     let what = arguments.next().unwrap_or_else(|| "fe-surface".to_owned());
     let wanted: Vec<String> = arguments.collect();
-    let build = Command::new(env!("CARGO")).args(["build", "--release", "--quiet", "--bin", "meshmill"]).status();
+    // Together with this example, so that both share what has been built.
+    let build = Command::new(env!("CARGO"))
+        .args(["build", "--release", "--quiet", "--bin", "meshmill", "--example", "acceptance"])
+        .status();
     if !build.is_ok_and(|status| status.success()) {
         println!("the program could not be built");
         return ExitCode::FAILURE;

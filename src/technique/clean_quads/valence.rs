@@ -41,36 +41,42 @@ pub fn sharpest_sector_of(mesh: &Mixed, f: u32) -> Option<f64> {
 
 /// The angle of the sector that the corner at the origin of `h` belongs to; `None` at a vertex without curves.
 fn sector_of(mesh: &Mixed, h: u32) -> Option<f64> {
-    let star: SmallVec<[u32; 16]> = mesh.star(mesh.origin(h)).collect();
-    let bound = |h: u32| mesh.arc(h) != NONE || mesh.face(h) == NONE || mesh.face(h ^ 1) == NONE;
-    let (n, at) = (star.len(), star.iter().position(|&k| k == h)?);
-    let first = (0..n).find(|back| bound(star[(at + n - back) % n]))?;
-    let sector = (0..n).map(|i| star[(at + n - first + i) % n]);
-    let inside = sector.enumerate().take_while(|&(i, k)| i == 0 || !bound(k));
-    Some(inside.filter(|&(_, k)| mesh.face(k) != NONE).map(|(_, k)| mesh.corner_angle(k)).sum())
+    let mut found = None;
+    walk_sectors(mesh, mesh.origin(h), |corners, angle| {
+        if corners.contains(&h) {
+            found = Some(angle);
+        }
+    });
+    found
 }
 
 /// The sectors between the curves and rims at a vertex, each with its quads and its angle; none where there is no curve.
 pub(super) fn sectors(mesh: &Mixed, v: u32) -> SmallVec<[(f64, f64); 8]> {
     let mut found = SmallVec::new();
+    walk_sectors(mesh, v, |corners, angle| found.push((corners.len() as f64, angle)));
+    found
+}
+
+/// Visits each sector at a vertex with its corners, as the sides that leave the vertex, and its angle.
+fn walk_sectors(mesh: &Mixed, v: u32, mut visit: impl FnMut(&[u32], f64)) {
     let star: SmallVec<[u32; 16]> = mesh.star(v).collect();
     let bound = |h: u32| mesh.arc(h) != NONE || mesh.face(h) == NONE || mesh.face(h ^ 1) == NONE;
-    let Some(start) = star.iter().position(|&h| bound(h)) else { return found };
-    let (mut quads, mut angle) = (0.0, 0.0);
+    let Some(start) = star.iter().position(|&h| bound(h)) else { return };
+    let (mut corners, mut angle) = (SmallVec::<[u32; 16]>::new(), 0.0);
     for i in 0..=star.len() {
         let h = star[(start + i) % star.len()];
         if i > 0 && bound(h) {
-            if quads > 0.0 {
-                found.push((quads, angle));
+            if !corners.is_empty() {
+                visit(&corners, angle);
             }
-            (quads, angle) = (0.0, 0.0);
+            corners.clear();
+            angle = 0.0;
         }
         if i < star.len() && mesh.face(h) != NONE {
-            quads += 1.0;
+            corners.push(h);
             angle += mesh.corner_angle(h);
         }
     }
-    found
 }
 
 /// The quads that fit into an angle, in radians.
