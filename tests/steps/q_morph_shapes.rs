@@ -166,6 +166,26 @@ fn what_fronts_fail_on_becomes_quads() {
     }
 }
 
+/// Needles that end in nearly one place are halved in nearly one place: what comes of it must not stay.
+#[test]
+fn a_fan_of_needles_leaves_no_trace() {
+    let rim = [(0.0, -1.0), (1.0, -1.0), (2.0, -1.0), (2.0, 0.0), (2.0, 1.0), (1.0, 1.0), (0.0, 1.0)];
+    for (count, gap) in [(12, 1e-4), (9, 1e-2)] {
+        let end = |k: usize| dvec3(1.5, 0.1 + gap * (k as f64 - 0.5 * count as f64) * [1.0, 1.3][k % 2], 0.0);
+        let mut points: Vec<DVec3> = rim.iter().map(|&(x, y)| dvec3(x, y, 0.0)).collect();
+        points.push(dvec3(0.5, 0.1, 0.0));
+        points.extend((0..count).map(end));
+        let (tip, low, high) = (7, 8, 7 + count);
+        let mut faces = vec![[tip, high, 5], [high, 3, 4], [high, 4, 5], [tip, 5, 6], [tip, 6, 0], [tip, 0, 1]];
+        faces.extend([[tip, 1, low], [low, 1, 2], [low, 2, 3]]);
+        faces.extend((low..high).flat_map(|k| [[tip, k, k + 1], [3, k + 1, k]]));
+        let soup = shapes::triangles(points, &faces);
+        let made = morph(&soup, "size = 0.1");
+        assert_sound("fan of needles", &soup, &made);
+        assert!(made.least() > 0.7, "{count} needles: the worst quad is {}", made.least());
+    }
+}
+
 #[test]
 fn a_capsule_of_three_regions_keeps_their_borders() {
     let mesh = capsule(24, 8);

@@ -1,7 +1,7 @@
 //! From the surface to clean quads, tried again with smaller sizes where distance or shapes are not good enough.
 //!
 //! Every attempt starts from the best one so far and makes only those regions anew whose triangles changed. Where one
-//! makes a region worse, that region is left alone from then on.
+//! makes a region worse, the next asks for still smaller faces there; where two did, the region is left alone.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -31,8 +31,14 @@ const BROKEN: f64 = 10.0;
 const LOOSER: f64 = 2.0;
 /// Faces below this shape are not worth smaller ones for the sake of distance.
 const USEFUL: f64 = 0.2;
+/// A region is left alone after so many attempts that made it worse.
+const FAILURES: u8 = 2;
+/// The part of the size that the second of them asks for.
+const AGAIN: f64 = 0.75;
 /// Shapes above this count as good.
 const FAIR: f64 = 0.5;
+/// What a poor shape weighs that the curves at its corners excuse.
+const CUSP: f64 = 0.5;
 /// The sides of faces in the place of a poor one, as a part of its own.
 const ROOM: f64 = 0.7;
 /// Where those are shorter than this part of the size asked for there, that part counts in their stead.
@@ -89,11 +95,11 @@ impl Morpher<'_, '_> {
         remesh(&mut mesh, ground, rules, watch)?;
         prepare(&mut mesh, ground, self.check, rules, watch)?;
         let mut best = self.attempt(mesh, None, rules, stats)?.ok_or(QMorphError::Empty)?;
-        let mut rests = vec![false; stats.regions];
+        let mut failures = vec![0_u8; stats.regions];
         let mut attempts = 1;
         let mut tried = Vec::new();
         while attempts < most {
-            let places = wanting(&best, &rests, rules.tolerance);
+            let places = wanting(&best, &failures, rules.tolerance);
             if places.is_empty() || places == tried {
                 break;
             }
@@ -101,8 +107,8 @@ impl Morpher<'_, '_> {
             tighten(&mut mesh, ground, rules, &places, watch)?;
             let Some(next) = self.attempt(mesh, Some(&best), rules, stats)? else { break };
             attempts += 1;
-            for (r, rest) in rests.iter_mut().enumerate() {
-                *rest |= next.by_region[r] > best.by_region[r];
+            for (r, failures) in failures.iter_mut().enumerate() {
+                *failures += u8::from(next.by_region[r] > best.by_region[r]);
             }
             if next.lack < best.lack {
                 best = next;
@@ -161,7 +167,7 @@ fn prepare(mesh: &mut Mixed, ground: &Ground<'_>, check: &Check, rules: Rules, w
             break;
         }
         let before = signs(mesh, changed.len());
-        let places = smaller(mesh, &faults, tolerance);
+        let places: Vec<_> = faults.iter().map(|fault| smaller(mesh, fault, tolerance)).collect();
         tighten(mesh, ground, rules, &places, watch)?;
         changed = signs(mesh, changed.len()).iter().zip(before).map(|(now, before)| *now != before).collect();
     }
@@ -175,13 +181,15 @@ fn lack(mesh: &Mixed, faults: &[Fault], tolerance: f64, regions: usize) -> (f64,
     for f in mesh.faces() {
         let quality = mesh.quality(f);
         let short = shortfall(mesh, f);
+        // Where curves touch, smaller faces see a sharper angle: that excuses them, and is no gain.
+        let poverty = short + CUSP * (FAIR - quality).max(0.0);
         let wrong = 10.0 * f64::from(quality <= 0.0) + 100.0 * f64::from(mesh.is_triangle(f));
         broken += wrong;
         poor += short;
-        poorest = poorest.max(short);
+        poorest = poorest.max(poverty);
         let region = mesh.region(f) as usize;
         by_region[region] += wrong;
-        poorest_of[region] = poorest_of[region].max(short);
+        poorest_of[region] = poorest_of[region].max(poverty);
     }
     let (mut worst, mut farthest) = (0.0_f64, vec![0.0_f64; regions]);
     for fault in faults {
@@ -211,16 +219,21 @@ fn shortfall(mesh: &Mixed, f: u32) -> f64 {
 }
 
 /// Where another attempt should have smaller faces: at faults of sound faces, and at poor faces, whose strips get more
-/// room for good ones. Not in regions at rest.
-fn wanting(attempt: &Attempt, rests: &[bool], tolerance: f64) -> Vec<(DVec3, f64, f64)> {
+/// room for good ones. Where one failed, still smaller; not in regions where two did.
+fn wanting(attempt: &Attempt, failures: &[u8], tolerance: f64) -> Vec<(DVec3, f64, f64)> {
     let mesh = &attempt.quads;
-    let wants = |f: u32| !rests[mesh.region(f) as usize];
-    let sound = attempt.faults.iter().filter(|fault| wants(fault.face) && mesh.quality(fault.face) > USEFUL);
-    let mut places = smaller(mesh, sound, tolerance);
+    let failed = |f: u32| failures[mesh.region(f) as usize];
+    let wants = |f: u32| failed(f) < FAILURES;
+    let again = |f: u32| if failed(f) == 0 { 1.0 } else { AGAIN };
+    let mut places = Vec::new();
+    for fault in attempt.faults.iter().filter(|fault| wants(fault.face) && mesh.quality(fault.face) > USEFUL) {
+        let (at, reach, size) = smaller(mesh, fault, tolerance);
+        places.push((at, reach, again(fault.face) * size));
+    }
     for f in mesh.faces().filter(|&f| wants(f) && shortfall(mesh, f) > 0.0) {
         // A sliver's sides say nothing about what would do in its place.
         let side = mean_side(mesh, f).max(LEAST_ROOM * mean_size(mesh, f));
-        places.push((mesh.centre(f), 1.2 * side, ROOM * side));
+        places.push((mesh.centre(f), 1.2 * side, again(f) * ROOM * side));
     }
     places
 }

@@ -72,19 +72,12 @@ impl Check {
     }
 }
 
-/// For each fault a middle, how far about it, and the size that should do there.
-pub(super) fn smaller<'a>(
-    mesh: &Mixed,
-    faults: impl IntoIterator<Item = &'a Fault>,
-    tolerance: f64,
-) -> Vec<(DVec3, f64, f64)> {
-    let place = |fault: &Fault| {
-        let side = mean_side(mesh, fault.face);
-        // Between what a round place needs, the square root, and what a pointed one does.
-        let factor = libm::pow(0.75 * tolerance / fault.distance, 0.75).clamp(0.4, 0.82);
-        (mesh.centre(fault.face), 1.2 * side, factor * side)
-    };
-    faults.into_iter().map(place).collect()
+/// Where a fault is, how far about it, and the size that should do there.
+pub(super) fn smaller(mesh: &Mixed, fault: &Fault, tolerance: f64) -> (DVec3, f64, f64) {
+    let side = mean_side(mesh, fault.face);
+    // Between what a round place needs, the square root, and what a pointed one does.
+    let factor = libm::pow(0.75 * tolerance / fault.distance, 0.75).clamp(0.4, 0.82);
+    (mesh.centre(fault.face), 1.2 * side, factor * side)
 }
 
 /// The mean length of a face's sides.

@@ -13,6 +13,12 @@ const TURN: f64 = 0.3;
 /// Cosine that a face must have with the surface at its free corners.
 const SIDE: f64 = 0.2;
 
+/// Vertices nearer to each other than this part of the size stand in each other's way.
+const STACKED: f64 = 0.25;
+
+/// Triangles of poorer shape are flat, but for rounding.
+const FLAT: f64 = 1e-7;
+
 fn upright(corners: [DVec3; 3], normal: DVec3) -> bool {
     let vector = area_vector(corners);
     vector.dot(normal) > TURN * vector.length() && triangle_quality(corners) > 1e-6
@@ -24,7 +30,7 @@ fn keeps_side(was: f64, reference: DVec3, after: [DVec3; 3]) -> bool {
     if was >= 0.05 {
         return upright(after, reference.normalize_or_zero());
     }
-    was < 1e-7 || area_vector(after).dot(reference) > 0.0
+    was < FLAT || area_vector(after).dot(reference) > 0.0
 }
 
 impl Remesher<'_, '_> {
@@ -82,23 +88,12 @@ impl Remesher<'_, '_> {
             Place::Arc { .. } if !on_arc => return false,
             Place::Arc { .. } | Place::Region(_) => {}
         }
-        // Exactly the two corners opposite to the edge may be neighbours of both ends.
         let apexes: SmallVec<[u32; 2]> = [h, h ^ 1]
             .into_iter()
             .filter(|&k| self.mesh.face(k) != NONE)
             .map(|k| self.mesh.origin(self.mesh.prev(k)))
             .collect();
-        let ring: SmallVec<[u32; 16]> = self.mesh.neighbours(kept).collect();
-        let common = self.mesh.neighbours(gone).filter(|w| ring.contains(w)).count();
-        if common != apexes.len() || apexes.iter().any(|&w| self.mesh.place(w).is_free() && self.mesh.valence(w) <= 4) {
-            return false;
-        }
-        // Two curves must not become one: the region between them would vanish.
-        let on_curve = |v: u32, w: u32| self.mesh.find(v, w).is_some_and(|k| self.mesh.arc(k) != NONE);
-        if apexes.iter().any(|&w| on_curve(kept, w) && on_curve(gone, w)) {
-            return false;
-        }
-        if !self.may_collapse(gone, kept, on_arc) {
+        if !self.keeps_apexes(h, &apexes) || !self.may_collapse(gone, kept, on_arc) {
             return false;
         }
         let old: SmallVec<[u32; 12]> = self.mesh.faces_at(gone).collect();
@@ -124,6 +119,23 @@ impl Remesher<'_, '_> {
         }
     }
 
+    /// Whether the corners opposite to an edge allow its collapse: as the only neighbours of both ends, with enough faces
+    /// left.
+    fn keeps_apexes(&self, h: u32, apexes: &[u32]) -> bool {
+        let (kept, gone) = (self.mesh.origin(h), self.mesh.target(h));
+        let ring: SmallVec<[u32; 16]> = self.mesh.neighbours(kept).collect();
+        let common = self.mesh.neighbours(gone).filter(|w| ring.contains(w)).count();
+        // A vertex of three faces is poor, a stack of vertices in nearly one place is worse.
+        let least = if self.mesh.length(h) < STACKED * self.mesh.size(kept) { 3 } else { 4 };
+        // Two curves must not become one: the region between them would vanish.
+        let on_curve = |v: u32, w: u32| self.mesh.find(v, w).is_some_and(|k| self.mesh.arc(k) != NONE);
+        common == apexes.len()
+            && apexes.iter().all(|&w| {
+                let is_thin = self.mesh.place(w).is_free() && self.mesh.valence(w) <= least;
+                !is_thin && !(on_curve(kept, w) && on_curve(gone, w))
+            })
+    }
+
     /// Whether the faces left by a collapse stay upright and their edges short enough.
     fn may_collapse(&self, gone: u32, kept: u32, on_arc: bool) -> bool {
         let to = self.mesh.point(kept);
@@ -141,14 +153,12 @@ impl Remesher<'_, '_> {
             if corners.contains(&kept) {
                 continue;
             }
-            let before = self.mesh.triangle(face);
-            let reference = area_vector(before);
+            let before = [corners[0], corners[1], corners[2]].map(|v| self.mesh.point(v));
             let after: SmallVec<[DVec3; 3]> =
                 corners.iter().map(|&v| if v == gone { to } else { self.mesh.point(v) }).collect();
             let after = [after[0], after[1], after[2]];
-            let (was, is) = (triangle_quality(before), triangle_quality(after));
             let ends = [0, 1, 2].map(|i| if corners[i] == gone { kept } else { corners[i] });
-            if is < 0.05 && is < was || !keeps_side(was, reference, after) || !self.fits(ends, after) {
+            if !self.may_replace(before, ends, after) {
                 return false;
             }
         }
@@ -170,7 +180,7 @@ impl Remesher<'_, '_> {
         if !upright([p, s, r], reference) || !upright([s, q, r], reference) {
             return false;
         }
-        if !self.fits([a, d, c], [p, s, r]) || !self.fits([d, b, c], [s, q, r]) {
+        if !self.fits([a, d, c], [p, s, r], reference) || !self.fits([d, b, c], [s, q, r], reference) {
             return false;
         }
         let poor = |v| self.mesh.place(v).is_free() && self.mesh.valence(v) <= 4;
@@ -193,14 +203,27 @@ impl Remesher<'_, '_> {
         }
     }
 
+    /// Whether a face may become another one: not a poorer needle, not over, and to the side of the surface.
+    fn may_replace(&self, before: [DVec3; 3], corners: [u32; 3], after: [DVec3; 3]) -> bool {
+        let (was, is) = (triangle_quality(before), triangle_quality(after));
+        if was < FLAT && is < FLAT {
+            return true;
+        }
+        let reference = if was < FLAT { DVec3::ZERO } else { area_vector(before) };
+        let is_spoilt = is < 0.05 && is < was;
+        !is_spoilt && keeps_side(was, reference, after) && self.fits(corners, after, reference)
+    }
+
     /// Whether a face looks to the same side as the surface does at its free corners. Edits check faces against those
     /// that they replace; this keeps many small turns from adding up until a face cuts across the body.
-    fn fits(&self, corners: [u32; 3], points: [DVec3; 3]) -> bool {
-        let vector = area_vector(points);
-        let least = SIDE * vector.length();
+    /// Where the surface has needles, their normals are anyone's guess: a face that looks no further away than the one
+    /// `before` passes.
+    fn fits(&self, corners: [u32; 3], points: [DVec3; 3], before: DVec3) -> bool {
+        let (now, before) = (area_vector(points).normalize_or_zero(), before.normalize_or_zero());
         corners.iter().all(|&v| {
             let normal = self.mesh.normal(v);
-            !self.mesh.place(v).is_free() || normal == DVec3::ZERO || vector.dot(normal) >= least
+            let least = SIDE.min(before.dot(normal) - 1e-9);
+            !self.mesh.place(v).is_free() || normal == DVec3::ZERO || now.dot(normal) >= least
         })
     }
 
@@ -211,17 +234,11 @@ impl Remesher<'_, '_> {
             return false;
         }
         for f in self.mesh.faces_at(v) {
-            let before = self.mesh.triangle(f);
             let corners = self.mesh.corners(f);
-            let mut after = [DVec3::ZERO; 3];
-            let mut was = [DVec3::ZERO; 3];
-            for i in 0..3 {
-                was[i] = self.mesh.point(corners[i]);
-                after[i] = if corners[i] == v { to } else { was[i] };
-            }
-            let (old, new) = (triangle_quality(before), triangle_quality(after));
             let ends = [corners[0], corners[1], corners[2]];
-            if new < 0.05 && new < old || !keeps_side(old, area_vector(was), after) || !self.fits(ends, after) {
+            let before = ends.map(|w| self.mesh.point(w));
+            let after = [0, 1, 2].map(|i| if ends[i] == v { to } else { before[i] });
+            if !self.may_replace(before, ends, after) {
                 return false;
             }
         }

@@ -27,7 +27,7 @@ pub use curves::{chains, curve_distance};
 pub use parity::{odd_regions, pair_up};
 
 use super::ground::Ground;
-use super::mixed::{Mixed, NONE, Place};
+use super::mixed::{Mixed, NONE, Place, triangle_quality};
 use crate::mesh::bvh::SegmentBvh;
 use crate::mesh::geometry::Aabb;
 use crate::watch::{Cancelled, Watch};
@@ -59,6 +59,9 @@ const QUIET: usize = 1000;
 const COLLAPSES: usize = 24;
 /// The same for flips.
 const FLIPS: usize = 12;
+
+/// A vertex on the surface is not worth faces whose shape is below this part of what it would be beside it.
+const SPOILT: f64 = 0.3;
 
 /// Sizes that are lowered by less than this do not count as changed: grading lowers many a little.
 const CHANGE: f64 = 0.97;
@@ -254,12 +257,24 @@ impl Remesher<'_, '_> {
             self.split(h, middle, normal, Place::Region(region), size);
             return;
         }
-        // On coarse facets the foot may leave the faces beside the edge; then the middle of the edge itself serves.
-        for point in [foot.point, middle] {
+        // On coarse facets the foot may leave the faces beside the edge, and beside a curve it may land on that: then the
+        // middle of the edge itself serves.
+        let spoils = self.poorest_half(h, foot.point) < SPOILT * self.poorest_half(h, middle);
+        let points = if spoils { [middle, foot.point] } else { [foot.point, middle] };
+        for point in points {
             if self.split(h, point, foot.normal, Place::Region(region), size).is_some() {
                 return;
             }
         }
+    }
+
+    /// The poorest of the faces that an edge's faces would become with a vertex in it.
+    fn poorest_half(&self, h: u32, point: DVec3) -> f64 {
+        let halves = [h, h ^ 1].into_iter().map(|k| {
+            let [a, b, apex] = [k, self.mesh.next(k), self.mesh.prev(k)].map(|k| self.mesh.point(self.mesh.origin(k)));
+            triangle_quality([a, point, apex]).min(triangle_quality([point, b, apex]))
+        });
+        halves.fold(f64::INFINITY, f64::min)
     }
 
     fn collapse_short(&mut self) -> usize {
