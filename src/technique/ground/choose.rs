@@ -1,19 +1,15 @@
 //! Which borders of regions are worth following: those that force bad faces are left out of the network.
 //!
 //! A border that meets another curve in a narrow wedge, or ends so near to another node that nothing fits between, would
-//! cost more in shapes than it gives in order. So would a border along a region that is narrower than any face is to be.
-//! Marked edges and borders of face groups are always followed.
+//! cost more in shapes than it gives in order. Marked edges and borders of face groups are always followed.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use glam::DVec3;
 
 use super::curve::{Curve, Network, curves, nodes};
-use super::{beside, flood};
-use crate::mesh::geometry::triangle_area;
 use crate::mesh::topology::EdgeTable;
 use crate::mesh::{MarkCause, Surface, VertexId, edge_key};
-use crate::technique::mixed::NONE;
 
 /// When a border is left out.
 #[derive(Clone, Copy, Debug)]
@@ -22,8 +18,7 @@ pub struct Choice {
     pub angle: f64,
     /// How far from a node directions are taken.
     pub reach: f64,
-    /// A piece of the network shorter than this costs a border at one of its ends, a region narrower than this one of its
-    /// borders.
+    /// A piece of the network shorter than this costs a border at one of its ends.
     pub gap: f64,
 }
 
@@ -49,9 +44,6 @@ pub(super) fn leave_out(
         let is_node = nodes(surface, network, corner, &released);
         let curves = curves(surface, network, is_node);
         let mut bad = judge(surface, edges, &curves, choice);
-        if bad.is_empty() {
-            bad = judge_regions(surface, edges, network, &curves, choice.gap);
-        }
         bad.sort_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
         let mut touched = BTreeSet::new();
         for (_, at) in bad {
@@ -128,43 +120,6 @@ fn judge(surface: &Surface, edges: &EdgeTable, curves: &[Curve], choice: &Choice
         }
     }
     bad
-}
-
-/// The longest border of each region that is narrower than `gap`, with how narrow: twice the area by the length of all
-/// borders, which is the width of a strip.
-fn judge_regions(
-    surface: &Surface,
-    edges: &EdgeTable,
-    network: &Network,
-    curves: &[Curve],
-    gap: f64,
-) -> Vec<(f64, usize)> {
-    let is_curve = |key: [VertexId; 2]| network.get(&key[0]).is_some_and(|spokes| spokes.iter().any(|s| s.0 == key[1]));
-    let (regions, count) = flood(surface, edges, is_curve);
-    let beside = beside(edges, curves, &regions);
-    let (mut area, mut rim) = (vec![0.0; count], vec![0.0; count]);
-    for f in surface.faces.ids() {
-        area[regions[f.index()] as usize] += triangle_area(surface.corners(f));
-    }
-    for (curve, sides) in curves.iter().zip(&beside) {
-        for &region in sides.iter().filter(|&&region| region != NONE) {
-            rim[region as usize] += curve.length();
-        }
-    }
-    let mut longest: Vec<Option<usize>> = vec![None; count];
-    for (i, (curve, &[left, right])) in curves.iter().zip(&beside).enumerate() {
-        if left == right || left == NONE || right == NONE || !is_optional(surface, edges, curve) {
-            continue;
-        }
-        for region in [left as usize, right as usize] {
-            let is_longest = longest[region].is_none_or(|other| curves[other].length() < curve.length());
-            if 2.0 * area[region] < gap * rim[region] && is_longest {
-                longest[region] = Some(i);
-            }
-        }
-    }
-    let width = |region: usize| 2.0 * area[region] / rim[region];
-    longest.iter().enumerate().filter_map(|(region, curve)| Some((width(region), (*curve)?))).collect()
 }
 
 /// Whether a curve is nothing but a border of regions.

@@ -90,7 +90,7 @@ impl<'a> Ground<'a> {
                 arcs.insert(crate::mesh::edge_key(pair[0], pair[1]), arc as u32);
             }
         }
-        let (regions, count) = flood(surface, &edges, |key| arcs.contains_key(&key));
+        let (regions, count) = flood(surface, &edges, &arcs);
         let places = places(surface, &curves, &regions, &released);
         let beside = beside(&edges, &curves, &regions);
         let mut of: Vec<Vec<FaceId>> = vec![Vec::new(); count];
@@ -155,11 +155,11 @@ impl<'a> Ground<'a> {
 }
 
 /// Faces joined across edges that are on no curve; regions are numbered by their lowest face.
-fn flood(surface: &Surface, edges: &EdgeTable, is_curve: impl Fn([VertexId; 2]) -> bool) -> (Vec<u32>, usize) {
+fn flood(surface: &Surface, edges: &EdgeTable, arcs: &FxHashMap<[VertexId; 2], u32>) -> (Vec<u32>, usize) {
     let mut beside: Vec<[u32; 3]> = vec![[NONE; 3]; surface.faces.len()];
     for (_, key, sides) in edges.iter() {
         if let [s, t] = sides
-            && !is_curve(key)
+            && !arcs.contains_key(&key)
         {
             beside[s.face.index()][s.side as usize] = t.face.raw();
             beside[t.face.index()][t.side as usize] = s.face.raw();

@@ -61,7 +61,7 @@ const COLLAPSES: usize = 24;
 const FLIPS: usize = 12;
 
 /// A vertex on the surface is not worth faces whose shape is below this part of what it would be beside it.
-const SPOILT: f64 = 0.3;
+const SPOILT: f64 = 0.1;
 
 /// Sizes that are lowered by less than this do not count as changed: grading lowers many a little.
 const CHANGE: f64 = 0.97;
