@@ -342,8 +342,9 @@ impl Bench<'_, '_> {
             .map(|&v| (self.editor.mesh().point(v), self.surfaces.number(v), self.surfaces.was_moved(v)))
             .collect();
         // What the collapsed edge or face allows no more, a place above it may: chords of a round face sink into it.
-        let above = self.editor.optimum(merge, first);
-        for wish in wishes.iter().copied().chain(above) {
+        let above = |editor: &Editor<'_>| editor.optimum(merge, first);
+        for at in 0..=wishes.len() {
+            let Some(wish) = wishes.get(at).copied().or_else(|| above(self.editor)) else { break };
             let Some(v) = self.editor.try_merge(merge, wish, rules) else { continue };
             let at = self.editor.mesh().point(v);
             let stayed = kept.iter().find(|(p, _, _)| *p == at);

@@ -22,6 +22,9 @@ const LEAST_BEND: f64 = 0.017_5;
 /// How many times larger than each of its smooth neighbours a flat face is.
 const LARGER: f64 = 2.0;
 
+/// Faces that make a flat face of the part.
+const LEAST_FACES: u32 = 2;
+
 /// Tolerances that a flat face is wide: twice its area by its perimeter.
 const WIDE: f64 = 2.0;
 
@@ -63,7 +66,11 @@ fn smooth_lines(surface: &Surface, wide: f64) -> Vec<EdgeKey> {
     let mut largest_beside = vec![0.0_f64; regions.area.len()];
     let bends = |[f, g]: [FaceId; 2]| {
         let [r, s] = [f, g].map(|f| regions.of_face[f.index()] as usize);
-        (r != s && angle(regions.normal[r], regions.normal[s]) > LEAST_BEND).then_some([r, s])
+        // Between two single faces no line is sought.
+        (r != s
+            && regions.faces[r].max(regions.faces[s]) >= LEAST_FACES
+            && angle(regions.normal[r], regions.normal[s]) > LEAST_BEND)
+            .then_some([r, s])
     };
     for (_, [r, s]) in pairs.iter().filter_map(|&(key, sides)| Some((key, bends(sides)?))) {
         largest_beside[r] = largest_beside[r].max(regions.area[s]);
@@ -73,7 +80,7 @@ fn smooth_lines(surface: &Surface, wide: f64) -> Vec<EdgeKey> {
     // Areas are those of parallelograms, twice those of the faces.
     let is_flat = |r: usize| {
         let is_large = regions.area[r] >= LARGER * largest_beside[r] && largest_beside[r] > 0.0;
-        regions.faces[r] >= 2 && is_large && regions.area[r] >= wide * perimeter[r]
+        regions.faces[r] >= LEAST_FACES && is_large && regions.area[r] >= wide * perimeter[r]
     };
     let lines = pairs.iter().filter(|&&(_, sides)| bends(sides).is_some_and(|[r, s]| is_flat(r) || is_flat(s)));
     lines.map(|&(key, _)| key).collect()
@@ -116,14 +123,12 @@ fn grow(surface: &Surface, pairs: &[(EdgeKey, [FaceId; 2])]) -> Regions {
     let count = surface.faces.len();
     let neighbours = neighbours(count, pairs);
     let vectors: Vec<_> = surface.faces.ids().map(|f| area_vector(surface.corners(f))).collect();
-    let mut order: Vec<FaceId> = surface.faces.ids().collect();
-    order.sort_by(|f, g| {
-        vectors[g.index()].length_squared().total_cmp(&vectors[f.index()].length_squared()).then(f.cmp(g))
-    });
+    let mut order: Vec<(f64, FaceId)> = surface.faces.ids().map(|f| (vectors[f.index()].length_squared(), f)).collect();
+    order.sort_unstable_by(|f, g| g.0.total_cmp(&f.0).then(f.1.cmp(&g.1)));
     let near = COPLANAR * Aabb::of(surface.points.iter().copied()).diagonal();
     let mut regions = Regions { of_face: vec![NONE; count], area: Vec::new(), faces: Vec::new(), normal: Vec::new() };
     let mut stack = Vec::new();
-    for seed in order {
+    for (_, seed) in order {
         if regions.of_face[seed.index()] != NONE {
             continue;
         }
@@ -169,14 +174,22 @@ impl Neighbours {
 }
 
 fn neighbours(count: usize, pairs: &[(EdgeKey, [FaceId; 2])]) -> Neighbours {
-    let mut both: Vec<[FaceId; 2]> = pairs.iter().flat_map(|&(_, [f, g])| [[f, g], [g, f]]).collect();
-    both.sort_unstable();
+    let both = || pairs.iter().flat_map(|&(_, [f, g])| [[f, g], [g, f]]);
     let mut start = vec![0_u32; count + 1];
-    for [f, _] in &both {
+    for [f, _] in both() {
         start[f.index() + 1] += 1;
     }
     for i in 0..count {
         start[i + 1] += start[i];
     }
-    Neighbours { start, faces: both.into_iter().map(|[_, g]| g).collect() }
+    let mut room = start.clone();
+    let mut faces = vec![FaceId::from_raw(0); start[count] as usize];
+    for [f, g] in both() {
+        faces[room[f.index()] as usize] = g;
+        room[f.index()] += 1;
+    }
+    for i in 0..count {
+        faces[start[i] as usize..start[i + 1] as usize].sort_unstable();
+    }
+    Neighbours { start, faces }
 }

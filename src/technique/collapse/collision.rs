@@ -40,9 +40,10 @@ impl Collision {
         self.tree.tidy(mesh);
     }
 
-    /// Whether a new face would meet another new one, or a face that stays, where they share no corner or edge.
-    pub fn hits(&mut self, mesh: &HalfedgeMesh, old: &[FaceId], new: &[[DVec3; 3]]) -> bool {
-        for (i, &a) in new.iter().enumerate() {
+    /// Whether a new face would meet another new one, or a face that stays, where they share no corner or edge. New ones
+    /// that are known to be one sheet do not meet each other.
+    pub fn hits(&mut self, mesh: &HalfedgeMesh, old: &[FaceId], new: &[[DVec3; 3]], is_sheet: bool) -> bool {
+        for (i, &a) in new.iter().enumerate().filter(|_| !is_sheet) {
             if new[..i].iter().any(|&b| !clearly_apart(a, b) && triangle_triangle(a, b).is_intersection()) {
                 return true;
             }

@@ -11,7 +11,7 @@ use glam::DVec3;
 
 use super::clip::{self, Convex};
 use super::envelope::Triangle;
-use super::target::{Target, find_owner, nearest};
+use super::target::{Target, find_owner, is_near_any, nearest};
 use crate::mesh::bvh::TriangleBvh;
 use crate::mesh::geometry::closest_on_triangle;
 use crate::mesh::halfedge::HalfedgeMesh;
@@ -93,28 +93,46 @@ struct Check<'c> {
 }
 
 impl<'a> Cover<'a> {
-    /// Finds an owner for each piece of the reference among the faces of `mesh`, whatever its distance; `own` is their
-    /// hierarchy.
-    pub(super) fn new(
-        reference: &'a Surface,
-        mesh: &HalfedgeMesh,
-        own: &TriangleBvh,
-        face_of: &[FaceId],
-        reach: Reach,
-        tolerance: f64,
-    ) -> Self {
-        let mut this = Self {
+    /// No pieces yet.
+    fn empty(reference: &'a Surface, slots: usize) -> Self {
+        Self {
             reference,
             pieces: Vec::with_capacity(reference.faces.len()),
             free: Vec::new(),
-            head: vec![NONE; mesh.face_slots()],
+            head: vec![NONE; slots],
             count: vec![0; reference.faces.len()],
             uncovered: 0,
             found: Vec::new(),
             parts: Vec::new(),
             targets: Vec::new(),
             plan: Plan::default(),
-        };
+        }
+    }
+
+    /// Each face of the reference is a face of the mesh, and owns itself, or what the one before it owned.
+    pub(super) fn of_itself(reference: &'a Surface, slots: usize, reach: Reach) -> Self {
+        let mut this = Self::empty(reference, slots);
+        let mut owner = FaceId::from_raw(0);
+        for f in reference.faces.ids() {
+            let corners = reference.corners(f);
+            if !covers(&reference.corners(owner), &corners, reach.reach) {
+                owner = f;
+            }
+            this.own(owner, f, &corners, 0.0);
+        }
+        this
+    }
+
+    /// Finds an owner for each piece of the reference among the faces of `mesh`, whatever its distance; `own` is their
+    /// hierarchy.
+    pub(super) fn new(
+        reference: &'a Surface,
+        mesh: &HalfedgeMesh,
+        own: &TriangleBvh,
+        reach: Reach,
+        tolerance: f64,
+    ) -> Self {
+        let mut this = Self::empty(reference, mesh.face_slots());
         let budget = 4_000_000 + 16 * (reference.faces.len() + mesh.face_count());
         let mut parts: Vec<Convex> = Vec::new();
         let mut hint = FaceId::from_raw(0);
@@ -127,7 +145,7 @@ impl<'a> Cover<'a> {
                 }
                 let (centre, radius) = clip::ball(&part);
                 let Some(closest) = own.closest(centre) else { return this };
-                let owner = face_of[closest.index as usize];
+                let owner = closest.face();
                 if covers(&mesh.corner_points(owner), &part, reach.reach) {
                     hint = owner;
                     this.own(owner, f, &part, 0.0);
@@ -215,16 +233,26 @@ impl<'a> Cover<'a> {
                 return true;
             }
             plan.retired.push(at);
-            self.place(piece, check, plan, reach)
+            self.cut_and_place(piece, check, plan, reach)
         })
     }
 
-    /// Cuts a piece until each part has an owner.
+    /// Finds an owner for a piece, or cuts it until each part has one.
     fn place(&mut self, piece: Piece, check: &mut Check<'_>, plan: &mut Plan, reach: Reach) -> bool {
+        let squared = squared_reach(&piece, reach);
+        if let Some(target) = find_owner(&piece.corners, check.targets, &mut check.hint, squared) {
+            plan.add(piece, &piece.corners, target);
+            return true;
+        }
+        self.cut_and_place(piece, check, plan, reach)
+    }
+
+    /// Cuts a piece that no target covers until each part has an owner.
+    fn cut_and_place(&mut self, piece: Piece, check: &mut Check<'_>, plan: &mut Plan, reach: Reach) -> bool {
         let mut parts = std::mem::take(&mut self.parts);
         parts.clear();
-        parts.push(Convex::from_slice(&piece.corners));
-        let mut covered = true;
+        let mut covered = check.budget > 0 && cut_part(&piece.corners, piece, check, plan, reach, &mut parts);
+        check.budget = check.budget.saturating_sub(1);
         while let (true, Some(part)) = (covered, parts.pop()) {
             covered = check.budget > 0 && place_part(&part, piece, check, plan, reach, &mut parts);
             check.budget = check.budget.saturating_sub(1);
@@ -274,8 +302,21 @@ fn place_part(
         plan.add(piece, part, target);
         return true;
     }
+    cut_part(part, piece, check, plan, reach, parts)
+}
+
+/// As [`place_part`] for a part that no target covers.
+fn cut_part(
+    part: &[DVec3],
+    piece: Piece,
+    check: &mut Check<'_>,
+    plan: &mut Plan,
+    reach: Reach,
+    parts: &mut Vec<Convex>,
+) -> bool {
+    let squared = squared_reach(&piece, reach);
     // A corner out of reach of all faces ends the search.
-    if part.iter().any(|&p| nearest(p, check.targets, check.hint).1 > squared) {
+    if !part.iter().all(|&p| is_near_any(p, check.targets, check.hint, squared)) {
         return false;
     }
     let (centre, radius) = clip::ball(part);

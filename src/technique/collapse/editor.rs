@@ -7,7 +7,7 @@
 use glam::DVec3;
 
 use super::collision::Collision;
-use super::envelope::Envelope;
+use super::envelope::Change;
 use super::keeper::Keeper;
 use super::limits::{Limits, least_stretch};
 use super::placement::{Order, Site};
@@ -76,6 +76,7 @@ pub(in crate::technique) struct Patch {
     pub(in crate::technique) points: Vec<[DVec3; 3]>,
     /// Whether the surface stays the same set of points, up to rounding.
     pub(in crate::technique) is_same: bool,
+    old_points: Vec<[DVec3; 3]>,
     beside: Vec<FaceId>,
     beside_points: Vec<[DVec3; 3]>,
 }
@@ -357,6 +358,7 @@ impl<'a> Editor<'a> {
     }
 
     fn costly_tests(&mut self, patch: &mut Patch) -> bool {
+        let mut is_sheet = false;
         if let Keeper::Distance { envelope, .. } = &mut self.keeper {
             patch.beside.clear();
             for &f in &patch.old {
@@ -368,13 +370,22 @@ impl<'a> Editor<'a> {
             }
             patch.beside_points.clear();
             patch.beside_points.extend(patch.beside.iter().map(|&f| self.mesh.corner_points(f)));
-            let admits = if patch.is_same { Envelope::admits_same } else { Envelope::admits };
-            if !admits(envelope, &patch.old, &patch.points, &patch.beside_points) {
+            patch.old_points.clear();
+            patch.old_points.extend(patch.old.iter().map(|&f| self.mesh.corner_points(f)));
+            let change = Change {
+                old: &patch.old,
+                was: &patch.old_points,
+                new: &patch.points,
+                beside: &patch.beside_points,
+                is_same: patch.is_same,
+            };
+            if !envelope.admits(&change) {
                 self.counts.beyond_tolerance += 1;
                 return false;
             }
+            is_sheet = envelope.is_sheet();
         }
-        if !patch.is_same && self.collision.hits(&self.mesh, &patch.old, &patch.points) {
+        if !patch.is_same && self.collision.hits(&self.mesh, &patch.old, &patch.points, is_sheet) {
             self.counts.collisions += 1;
             return false;
         }

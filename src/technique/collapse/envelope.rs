@@ -6,9 +6,10 @@
 //! - **Reference to surface.** The reference is cut into pieces; each is owned by one live face, in whose offset its
 //!   corners lie. An edit must find an owner among the new faces, or those next to them, for every piece of the faces
 //!   that it replaces (`cover`).
-//! - **Surface to reference.** Each new face is cut along the sides of the triangles of the reference that lie under it,
-//!   found by their box hierarchy, until every part lies in the offset of one of them, or within `ε` by the Lipschitz
-//!   bound of its middle.
+//! - **Surface to reference.** Each face has a bound of its distance, to which an edit adds how far it moves the surface
+//!   (`drift`): no look at the reference while that is within the tolerance. Else the new face is cut along the sides of
+//!   the triangles of the reference that lie under it, found by their box hierarchy, until every part lies in the offset
+//!   of one of them, or within `ε` by the Lipschitz bound of its middle.
 //!
 //! Both are local and exact up to rounding, for which 2 % of the tolerance are held back; so the surface as a whole
 //! keeps the tolerance at every moment. Where the input broke it at the beginning, no edit makes that worse.
@@ -20,6 +21,7 @@ use glam::DVec3;
 
 use super::clip::{self, Convex};
 use super::cover::{Cover, Reach};
+use super::drift::Drift;
 use super::target::Target;
 use crate::mesh::bvh::TriangleBvh;
 use crate::mesh::halfedge::HalfedgeMesh;
@@ -39,6 +41,28 @@ const CERTIFY_BUDGET: usize = 1_000_000;
 
 pub(super) type Triangle = [DVec3; 3];
 
+/// A bound up to this part of the tolerance decides. Between it and the tolerance the full test does, which may refuse
+/// what comes that near, as parts do not get finer than [`FINEST`]: so a face's past does not decide what is admitted.
+const SURE: f64 = 1.0 - 2.0 * FINEST;
+
+/// How far faces that count as the same set of points may be apart, as a part of the tolerance.
+const SAME: f64 = 2e-6;
+
+/// An edit as the zone sees it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Change<'e> {
+    /// The faces replaced.
+    pub(super) old: &'e [FaceId],
+    /// Their corners.
+    pub(super) was: &'e [Triangle],
+    /// Their successors.
+    pub(super) new: &'e [Triangle],
+    /// Faces next to them that stay.
+    pub(super) beside: &'e [Triangle],
+    /// Whether the surface stays as it is, as a set of points.
+    pub(super) is_same: bool,
+}
+
 /// The tolerance zone of a reference, and who covers which piece of it.
 #[derive(Debug)]
 pub struct Envelope<'a> {
@@ -47,24 +71,46 @@ pub struct Envelope<'a> {
     reach: f64,
     finest: f64,
     cover: Cover<'a>,
+    /// A bound of the distance of each live face from the reference; infinite where none is known.
+    strays: Vec<f32>,
+    drift: Drift,
+    /// The bounds of the faces of the last edit tested: old ones, and new ones.
+    known: Vec<f64>,
+    found: Vec<f64>,
     hint: usize,
     parts: Vec<Convex>,
 }
 
 impl<'a> Envelope<'a> {
-    /// The zone of `tolerance` round the reference, covered by the faces of `mesh`, whose hierarchy is `own`.
+    /// The zone of `tolerance` round the reference, covered by the faces of `mesh`, whose hierarchy is `own`; without
+    /// one, the mesh is the reference, face by face.
     pub fn new(
         reference: &'a Surface,
         tree: &'a TriangleBvh,
         tolerance: f64,
         mesh: &HalfedgeMesh,
-        own: &TriangleBvh,
-        face_of: &[FaceId],
+        own: Option<&TriangleBvh>,
     ) -> Self {
         let reach = MARGIN * tolerance;
         let finest = FINEST * reach;
-        let cover = Cover::new(reference, mesh, own, face_of, Reach { reach, finest }, tolerance);
-        Self { reference, tree, reach, finest, cover, hint: 0, parts: Vec::new() }
+        let slots = mesh.face_slots();
+        let (cover, stray) = match own {
+            Some(own) => (Cover::new(reference, mesh, own, Reach { reach, finest }, tolerance), f32::INFINITY),
+            None => (Cover::of_itself(reference, slots, Reach { reach, finest }), 0.0),
+        };
+        Self {
+            reference,
+            tree,
+            reach,
+            finest,
+            cover,
+            strays: vec![stray; slots],
+            drift: Drift::default(),
+            known: Vec::new(),
+            found: Vec::new(),
+            hint: 0,
+            parts: Vec::new(),
+        }
     }
 
     /// Pieces of the reference that were further than the tolerance from the surface at the beginning.
@@ -72,15 +118,18 @@ impl<'a> Envelope<'a> {
         self.cover.uncovered
     }
 
-    /// Whether the whole surface and the whole reference lie within `tolerance` of each other, certified anew for the
-    /// surface's side; the reference's side is what the pieces stand for.
+    /// Whether the whole surface and the whole reference lie within `tolerance` of each other: by what edits have kept,
+    /// and where no edit came by, by the full test. The reference's side is what the pieces stand for.
     pub fn certifies(&mut self, mesh: &HalfedgeMesh, tolerance: f64) -> bool {
         // Edits keep a little less than the tolerance. Parts smaller than the rest pass wherever the surface does; how
         // finely an edit was tested says nothing here, as its faces are cut in another order.
         let kept = (self.reach, self.finest);
         (self.reach, self.finest) = (tolerance, 0.5 * (1.0 - MARGIN) * tolerance);
         let faces: Vec<FaceId> = mesh.faces().collect();
-        let within = faces.into_iter().all(|f| self.is_within(&mesh.corner_points(f), CERTIFY_BUDGET));
+        let within = faces.into_iter().all(|f| {
+            f64::from(self.strays[f.index()]) <= tolerance
+                || self.bound(&mesh.corner_points(f), CERTIFY_BUDGET).is_some()
+        });
         (self.reach, self.finest) = kept;
         within && self.cover.uncovered == 0
     }
@@ -100,20 +149,44 @@ impl<'a> Envelope<'a> {
         self.tree.near(p, self.reach * self.reach, self.reach * self.reach).is_some()
     }
 
-    /// Whether the edit keeps the tolerance both ways.
-    ///
-    /// `old` are the faces replaced, `new` their successors; `beside` are faces next to them that stay. On `true`, the
-    /// new owners wait for [`Envelope::commit`].
-    pub fn admits(&mut self, old: &[FaceId], new: &[Triangle], beside: &[Triangle]) -> bool {
-        new.iter().all(|face| self.may_be_within(face))
-            && new.iter().all(|face| self.is_within(face, CHECK_BUDGET))
-            && self.cover.admits(old, new, beside, Reach { reach: self.reach, finest: self.finest })
+    /// Whether the edit keeps the tolerance both ways. On `true`, the new owners and bounds wait for
+    /// [`Envelope::commit`].
+    pub(super) fn admits(&mut self, change: &Change<'_>) -> bool {
+        let mut known = std::mem::take(&mut self.known);
+        let mut found = std::mem::take(&mut self.found);
+        known.clear();
+        known.extend(change.old.iter().map(|f| f64::from(self.strays[f.index()])));
+        let is_near = if change.is_same {
+            found.clear();
+            let most = known.iter().copied().fold(0.0, f64::max);
+            found.resize(change.new.len(), most + SAME * self.reach);
+            true
+        } else {
+            self.drift.bounds(change.was, &known, change.new, &mut found);
+            self.bounds_hold(change.new, &mut found)
+        };
+        (self.known, self.found) = (known, found);
+        let reach = Reach { reach: self.reach, finest: self.finest };
+        is_near && self.cover.admits(change.old, change.new, change.beside, reach)
     }
 
-    /// As [`Envelope::admits`] for an edit that leaves the surface as it is, as a set of points: only the pieces need
-    /// owners.
-    pub fn admits_same(&mut self, old: &[FaceId], new: &[Triangle], beside: &[Triangle]) -> bool {
-        self.cover.admits(old, new, beside, Reach { reach: self.reach, finest: self.finest })
+    /// Whether the faces of the last edit tested were seen not to meet each other but where they touch.
+    pub(super) fn is_sheet(&self) -> bool {
+        self.drift.is_sheet
+    }
+
+    /// Whether all new faces lie within the tolerance: by their bounds, or else held against the reference, which gives
+    /// new bounds.
+    fn bounds_hold(&mut self, new: &[Triangle], bounds: &mut [f64]) -> bool {
+        let reach = self.reach;
+        let sure = SURE * reach;
+        new.iter().zip(&*bounds).all(|(face, &bound)| bound <= sure || self.may_be_within(face))
+            && new.iter().zip(bounds).all(|(face, bound)| {
+                if *bound > sure {
+                    *bound = self.bound(face, CHECK_BUDGET).map_or(f64::INFINITY, |found| found.min(*bound));
+                }
+                *bound <= reach
+            })
     }
 
     /// Whether the points of a triangle that stray first, the middles of it and of its sides, lie within the tolerance: a
@@ -125,67 +198,80 @@ impl<'a> Envelope<'a> {
         middles.into_iter().all(|p| self.tree.near(p, squared, squared).is_some())
     }
 
-    /// Whether a triangle lies within the tolerance of the reference.
+    /// A bound of the distance of a triangle from the reference where it lies within the tolerance.
     ///
     /// A part that no single triangle covers is cut along the sides of the one nearest to its middle: what lies over
     /// that one is judged by its corners, the rest goes on. Neighbouring parts mostly lie near the same triangle, so the
     /// last one found is asked first, and the tree is searched only until something is near enough.
-    fn is_within(&mut self, face: &Triangle, mut budget: usize) -> bool {
+    fn bound(&mut self, face: &Triangle, mut budget: usize) -> Option<f64> {
         let mut parts = std::mem::take(&mut self.parts);
         parts.clear();
         parts.push(Convex::from_slice(face));
         let mut known = self.reference_target(self.hint);
-        let mut within = true;
-        while let (true, Some(part)) = (within, parts.pop()) {
-            within = budget > 0 && self.settle_part(&part, &mut known, &mut parts);
+        let mut bound = Some(0.0);
+        while let (Some(most), Some(part)) = (bound, parts.pop()) {
+            let found = if budget > 0 { self.settle_part(&part, &mut known, &mut parts) } else { None };
+            bound = found.map(|squared| squared.max(most));
             budget = budget.saturating_sub(1);
         }
         self.parts = parts;
-        within
+        bound.map(|squared| squared.sqrt().min(self.reach))
     }
 
-    /// Certifies a part, or replaces it by smaller ones; `false` where it reaches out of the zone, or may.
-    fn settle_part(&mut self, part: &Convex, known: &mut Option<Target>, parts: &mut Vec<Convex>) -> bool {
+    /// Certifies a part, and says by which squared distance, or replaces it by smaller ones; `None` where it reaches out
+    /// of the zone, or may.
+    fn settle_part(&mut self, part: &Convex, known: &mut Option<Target>, parts: &mut Vec<Convex>) -> Option<f64> {
         let squared = self.reach * self.reach;
-        if known.is_some_and(|known| known.covers(part, squared)) {
-            return true;
+        if let Some(furthest) = known.and_then(|known| known.furthest(part, squared)) {
+            return Some(furthest);
         }
         let (centre, radius) = clip::ball(part);
         let slack = (self.reach - radius).max(0.0);
-        if slack > 0.0 && known.is_some_and(|known| known.distance_squared(centre) <= slack * slack) {
-            return true;
+        let in_ball = |from_centre: f64| {
+            let is_near = slack > 0.0 && from_centre <= slack * slack;
+            is_near.then(|| (from_centre.sqrt() + radius) * (from_centre.sqrt() + radius))
+        };
+        if let Some(furthest) = known.filter(|_| slack > 0.0).and_then(|known| in_ball(known.distance_squared(centre)))
+        {
+            return Some(furthest);
         }
-        let Some(closest) = self.tree.near(centre, squared, slack * slack) else { return false };
+        let closest = self.tree.near(centre, squared, slack * slack)?;
         self.hint = closest.index as usize;
         *known = self.reference_target(self.hint);
-        let Some(target) = *known else { return false };
-        if closest.nearest.distance_squared <= slack * slack && slack > 0.0 || target.covers(part, squared) {
-            return true;
+        let target = (*known)?;
+        if let Some(furthest) = in_ball(closest.nearest.distance_squared).or_else(|| target.furthest(part, squared)) {
+            return Some(furthest);
         }
         if target.squared > 0.0
             && let before = parts.len()
             && let Some(over) = clip::cut_out(part, target.corners, target.normal, 1e-3 * self.reach, parts)
         {
-            if target.covers(&over, squared) {
-                return true;
+            if let Some(furthest) = target.furthest(&over, squared) {
+                return Some(furthest);
             }
             if parts.len() > before {
                 parts.push(over);
-                return true;
+                return Some(0.0);
             }
         }
         let (extent, halves) = clip::halve(part);
         parts.extend(halves.into_iter().filter(|half| !half.is_empty()));
-        extent > self.finest
+        (extent > self.finest).then_some(0.0)
     }
 
     fn reference_target(&self, face: usize) -> Option<Target> {
         (face < self.reference.faces.len()).then(|| Target::new(self.reference.corners(FaceId::new(face)), self.reach))
     }
 
-    /// Makes the owners found by the last check that said `true` the owners; `targets` are the faces in the order of
-    /// `new`, then of `beside`.
-    pub fn commit(&mut self, old: &[FaceId], targets: &[FaceId]) {
+    /// Makes what the last check that said `true` found hold: `targets` are the new faces in its order, then those
+    /// beside.
+    pub(super) fn commit(&mut self, old: &[FaceId], targets: &[FaceId]) {
+        let most = targets.iter().map(|f| f.index() + 1).max().unwrap_or(0);
+        self.strays.resize(self.strays.len().max(most), f32::INFINITY);
+        for (face, &bound) in targets.iter().zip(&self.found) {
+            // The cast may round down.
+            self.strays[face.index()] = bound as f32 * (1.0 + 2.0 * f32::EPSILON);
+        }
         self.cover.commit(old, targets);
     }
 }

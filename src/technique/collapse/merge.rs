@@ -91,13 +91,20 @@ impl Editor<'_> {
         before
     }
 
-    /// What is known of a place where vertices become one.
-    fn site_of(&self, placement: Placement, ends: &[VertexId]) -> Site {
+    /// The planes and lines of all that was merged into these vertices.
+    fn quadrics_of(&self, ends: &[VertexId]) -> [Quadric; 2] {
         let (mut planes, mut lines) = (Quadric::default(), Quadric::default());
         for &v in ends {
             planes = planes.plus(self.quadrics.planes(v));
             lines = lines.plus(&self.quadrics.lines(v));
         }
+        [planes, lines]
+    }
+
+    /// What is known of a place where vertices become one.
+    fn site_of(&self, placement: Placement, ends: &[VertexId]) -> Site {
+        // The certified distance asks for no planes.
+        let [planes, lines] = if self.keeper.is_certified() { [Quadric::default(); 2] } else { self.quadrics_of(ends) };
         let points = [ends[0], ends[ends.len() - 1]].map(|v| self.mesh.point(v));
         // The caller brings the positions: no centroid is asked for.
         Site { placement, ends: points, centroid: DVec3::ZERO, planes, lines, origin: self.quadrics.origin }
@@ -129,12 +136,15 @@ impl Editor<'_> {
     /// The point of least squared distance to the planes and lines of all that was merged, nearest to `near`; `None` where
     /// freedom fixes the place, the planes leave it far away, or it is that point itself.
     pub fn optimum(&self, merge: &Merge, near: DVec3) -> Option<DVec3> {
-        let site = &merge.site;
-        let x = site.planes.plus(&site.lines).optimum(near - site.origin) + site.origin;
+        if merge.placement != Placement::Anywhere {
+            return None;
+        }
+        let ([planes, lines], site) = (self.quadrics_of(&merge.ends), &merge.site);
+        let x = planes.plus(&lines).optimum(near - site.origin) + site.origin;
         let [p, q] = site.ends;
         // In flat places it is the same point up to rounding, which would only take it off its plane.
         let moved = (x - near).length_squared() / (q - p).length_squared();
-        (merge.placement == Placement::Anywhere && (1e-12..=4.0).contains(&moved)).then_some(x)
+        (1e-12..=4.0).contains(&moved).then_some(x)
     }
 
     /// The edges round the star of the last plan, opposite to the merged vertex.

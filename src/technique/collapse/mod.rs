@@ -22,6 +22,7 @@ mod clip;
 pub mod collision;
 mod corners;
 mod cover;
+mod drift;
 pub mod editor;
 pub mod envelope;
 pub mod keeper;

@@ -31,9 +31,9 @@ pub struct Site {
     pub ends: [DVec3; 2],
     /// The centroid of the ring.
     pub centroid: DVec3,
-    /// Planes of both ends, about `origin`.
+    /// Planes of both ends, about `origin`; empty where nothing asks for them.
     pub planes: Quadric,
-    /// Lines of both ends, about `origin`.
+    /// Lines of both ends, about `origin`; empty where nothing asks for them.
     pub lines: Quadric,
     /// The local origin of the quadrics.
     pub origin: DVec3,

@@ -82,9 +82,9 @@ pub fn open<'a>(
         ToleranceMode::QuadricSum => Keeper::QuadricSum { most: setup.tolerance, weight: setup.feature_weight },
         ToleranceMode::QuadricRms => Keeper::QuadricRms { most: setup.tolerance },
         ToleranceMode::Distance => {
-            let own = TriangleBvh::of_surface(surface);
-            let face_of: Vec<FaceId> = surface.faces.ids().collect();
-            let envelope = Envelope::new(reference, tree, setup.tolerance, &mesh, &own, &face_of);
+            let is_same = surface.faces == reference.faces && surface.points == reference.points;
+            let own = (!is_same).then(|| TriangleBvh::of_surface(surface));
+            let envelope = Envelope::new(reference, tree, setup.tolerance, &mesh, own.as_ref());
             let curves = Curves::new(curve_segments(surface, &mesh, reference), setup.feature_tolerance);
             Keeper::Distance { envelope: Box::new(envelope), curves }
         }

@@ -12,6 +12,7 @@ pub(super) struct Target {
     /// Its box, grown by the reach.
     low: DVec3,
     high: DVec3,
+    reach: f64,
     pub(super) normal: DVec3,
     /// The square of the normal; 0 where the triangle is too thin to have one.
     pub(super) squared: f64,
@@ -25,7 +26,7 @@ impl Target {
         let squared = normal.length_squared();
         // Needles get no shortcut: their normal may be off.
         let squared = if squared > 1e-12 * size * size { squared } else { 0.0 };
-        Self { corners, low: a.min(b).min(c) - reach, high: a.max(b).max(c) + reach, normal, squared }
+        Self { corners, low: a.min(b).min(c) - reach, high: a.max(b).max(c) + reach, reach, normal, squared }
     }
 
     /// The side that `p` lies furthest beyond, or the longest one where the triangle is too thin to say.
@@ -53,15 +54,41 @@ impl Target {
         part.iter().all(|&p| self.is_near(p, squared))
     }
 
-    fn is_near(&self, p: DVec3, squared: f64) -> bool {
+    /// The squared distance of the furthest corner of `part`, and so of all of it, where that is at most `squared`.
+    pub(super) fn furthest(&self, part: &[DVec3], squared: f64) -> Option<f64> {
+        part.iter().try_fold(0.0, |most, &p| {
+            let own = if self.is_off(p, squared) { f64::INFINITY } else { self.distance_squared(p) };
+            (own <= squared).then_some(own.max(most))
+        })
+    }
+
+    pub(super) fn is_near(&self, p: DVec3, squared: f64) -> bool {
         if self.squared > 0.0 {
-            let height = self.normal.dot(p - self.corners[0]);
-            // A point further from the plane by more than rounding is further from the triangle.
+            let [a, b, c] = self.corners;
+            let (ab, ac, ap) = (b - a, c - a, p - a);
+            let height = self.normal.dot(ap);
             if height * height > 1.000_001 * squared * self.squared {
                 return false;
             }
+            let (v, w) = (ap.cross(ac).dot(self.normal), ab.cross(ap).dot(self.normal));
+            // Over the triangle its plane is what is nearest.
+            if v >= 0.0 && w >= 0.0 && v + w <= self.squared {
+                return height * height <= squared * self.squared;
+            }
         }
         self.distance_squared(p) <= squared
+    }
+
+    /// Whether a point is further from the plane than that: by more than rounding, and so further from the triangle.
+    fn is_off(&self, p: DVec3, squared: f64) -> bool {
+        let height = self.normal.dot(p - self.corners[0]);
+        self.squared > 0.0 && height * height > 1.000_001 * squared * self.squared
+    }
+
+    /// Whether a point is further from the box than that.
+    fn is_out(&self, p: DVec3, squared: f64) -> bool {
+        let beyond = (self.low + self.reach - p).max(p - (self.high - self.reach)).max(DVec3::ZERO);
+        beyond.length_squared() > 1.000_001 * squared
     }
 
     /// Whether `part` reaches out of the box by more than the reach that the box was grown by.
@@ -81,13 +108,18 @@ pub(super) fn find_owner(part: &[DVec3], targets: &[Target], hint: &mut usize, s
     Some(owner as u32)
 }
 
+/// Whether any target lies within the root of `squared`; `hint` is one that is likely to.
+pub(super) fn is_near_any(p: DVec3, targets: &[Target], hint: usize, squared: f64) -> bool {
+    targets.get(hint).is_some_and(|target| target.is_near(p, squared))
+        || targets.iter().any(|target| !target.is_out(p, squared) && target.is_near(p, squared))
+}
+
 /// The target nearest to `p`, and its squared distance; `hint` is one that is likely to be near.
 pub(super) fn nearest(p: DVec3, targets: &[Target], hint: usize) -> (u32, f64) {
     let hint = if hint < targets.len() { hint } else { 0 };
     let mut best = (hint as u32, targets.get(hint).map_or(f64::INFINITY, |target| target.distance_squared(p)));
     for (at, target) in targets.iter().enumerate() {
-        let height = target.normal.dot(p - target.corners[0]);
-        if at == hint || height * height > 1.000_001 * best.1 * target.squared && target.squared > 0.0 {
+        if at == hint || target.is_off(p, best.1) || target.is_out(p, best.1) {
             continue;
         }
         let squared = target.distance_squared(p);
