@@ -132,7 +132,7 @@ impl Remesher<'_, '_> {
         common == apexes.len()
             && apexes.iter().all(|&w| {
                 let is_thin = self.mesh.place(w).is_free() && self.mesh.valence(w) <= least;
-                !is_thin && !(on_curve(kept, w) && on_curve(gone, w))
+                !(is_thin || on_curve(kept, w) && on_curve(gone, w))
             })
     }
 
