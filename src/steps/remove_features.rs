@@ -196,7 +196,7 @@ pub struct Step;
 
 impl StepContract for Step {
     const NAME: &'static str = "remove-features";
-    const REVISION: u32 = 6;
+    const REVISION: u32 = 7;
     const INPUTS: &'static [InputDef] = &[InputDef {
         name: "from",
         accepts: &[Port::Surface],

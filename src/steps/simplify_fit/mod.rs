@@ -450,7 +450,7 @@ pub struct Step;
 
 impl crate::step::Step for Step {
     const NAME: &'static str = "simplify-fit";
-    const REVISION: u32 = 4;
+    const REVISION: u32 = 5;
     const INPUTS: &'static [InputDef] = &[
         InputDef { name: "from", accepts: &[Port::Surface], required: true, doc: "the surface to simplify" },
         InputDef {
