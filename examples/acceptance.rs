@@ -277,7 +277,9 @@ fn levels(wanted: &[String]) -> bool {
         if is_wanted(&part, wanted) {
             let sets: Vec<String> = sets.iter().map(|&set| set.to_owned()).collect();
             let rows = table_rows(recipe, &part, &sets, states);
-            all_hold &= rows.code == 0 && rows.sound.iter().skip(1).all(|&sound| sound);
+            // The mesh as it was and the paper's pure collapse stand beside ours.
+            let judged = |state: &str| state != "original" && !state.starts_with("pure");
+            all_hold &= rows.code == 0 && states.iter().zip(&rows.sound).all(|(s, &sound)| sound || !judged(s));
         }
     }
     all_hold

@@ -45,6 +45,11 @@ pub struct Patches {
 /// The four cubic basis functions that are not zero at `t`, of `spans` uniform spans: the first one's number, values,
 /// first derivatives.
 pub fn basis(spans: usize, t: f64) -> (usize, [f64; 4], [f64; 4]) {
+    if spans == 1 {
+        let (s, n) = (1.0 - t, 3.0);
+        let value = [s * s * s, n * s * s * t, n * s * t * t, t * t * t];
+        return (0, value, [-n * s * s, n * s * (s - 2.0 * t), n * t * (2.0 * s - t), n * t * t]);
+    }
     let n = spans as f64;
     let span = ((t * n) as usize).min(spans - 1);
     let knot = |i: usize| ((i as f64 - 3.0) / n).clamp(0.0, 1.0);

@@ -1,7 +1,10 @@
 //! The elements of a quad mesh on their surface: common paths as arcs, and the vertices that each element covers.
 
+use glam::DVec3;
+use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 
+use crate::mesh::bvh::TriangleBvh;
 use crate::mesh::carried::{EdgeKey, edge_key};
 use crate::mesh::geometry::angle;
 use crate::mesh::{Cover, FaceId, IdVec, MarkCause, Quads, Surface, VertexId};
@@ -28,6 +31,9 @@ pub enum FrameError {
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Arc {
     pub(super) path: Vec<VertexId>,
+    /// What the curve follows: the vertices, and where the curve may lie anywhere on the mesh, without the zigzag of a
+    /// path that runs along the edges of triangles.
+    pub(super) points: Vec<DVec3>,
     /// The elements beside it with the number of their side, the first one running along.
     pub(super) beside: Vec<(usize, usize)>,
     /// Whether the mesh is smooth across.
@@ -78,14 +84,38 @@ pub(super) fn frame<'g>(ground: &'g Ground<'g>, quads: &Quads) -> Result<Frame<'
             let arc = *known.entry(key).or_insert(next);
             if arc == next {
                 let is_smooth = is_smooth(ground, &path);
-                arcs.push(Arc { path: path.clone(), beside: Vec::new(), is_smooth });
+                arcs.push(Arc { path: path.clone(), points: Vec::new(), beside: Vec::new(), is_smooth });
             }
             arcs[arc].beside.push((element, k));
             own.push((arc, arcs[arc].path[0] == path[0]));
         }
         sides.push(own);
     }
+    let tree = TriangleBvh::of_surface(ground.surface);
+    arcs.par_iter_mut().for_each(|arc| arc.points = points(ground, arc, &tree));
     Ok(Frame { layout, arcs, sides })
+}
+
+/// The points that the curve of an arc follows; three at least.
+fn points(ground: &Ground<'_>, arc: &Arc, tree: &TriangleBvh) -> Vec<DVec3> {
+    /// Means of neighbours that are taken: enough for steps of some edges' length.
+    const ROUNDS: usize = 8;
+    let mut points: Vec<DVec3> = arc.path.iter().map(|&v| ground.point(v)).collect();
+    if points.len() == 2 {
+        points.insert(1, points[0].midpoint(points[1]));
+    }
+    if !(arc.is_smooth && arc.beside.len() == 2) {
+        return points;
+    }
+    for _ in 0..ROUNDS {
+        let before = points.clone();
+        for (point, around) in points[1..].iter_mut().zip(before.windows(3)) {
+            *point = 0.5 * around[1] + 0.25 * (around[0] + around[2]);
+        }
+    }
+    let last = points.len() - 1;
+    points[1..last].iter_mut().for_each(|p| *p = tree.closest(*p).map_or(*p, |near| near.nearest.point));
+    points
 }
 
 /// Whether no marked edge but the border of a region runs along a path, and the mesh does not bend there.

@@ -3,7 +3,7 @@
 //! The common curves come first, least squares over the path with both ends fixed, so that neighbours share them; then
 //! the control points inside, least squares over the covered vertices with a thin-plate term, whose parameters are then
 //! corrected to the feet of the vertices and the fit repeated. A patch farther from its vertices than the tolerance gets
-//! twice the spans. Patches meet in common curves; the angle between their tangent planes is measured. On demand smooth
+//! twice the spans, where that helps. Patches meet in common curves; the angle between their tangent planes is measured. On demand smooth
 //! seams get a common plane at each of their points: curves leave their nodes in one plane, and the control points next
 //! to a seam are drawn into the mean of the planes of both patches, by the same least squares. That is tangent
 //! continuity within a tolerance, not to the last digit, which bicubic patches round any node cannot have.
@@ -13,6 +13,7 @@
 
 mod flatten;
 mod frame;
+mod refine;
 pub mod sample;
 pub mod solve;
 pub mod tangent;
@@ -22,12 +23,13 @@ use rayon::prelude::*;
 
 use crate::mesh::bvh::TriangleBvh;
 use crate::mesh::patches::{Patch, Patches, Seam};
-use crate::mesh::{Quads, Soup, Surface};
+use crate::mesh::{Quads, Soup, Surface, VertexId};
 use crate::technique::layout::Ground;
 use crate::watch::{Cancelled, Watch};
 pub use frame::FrameError;
 use frame::{Frame, covered, frame};
-use solve::{Curve, fit_curve, fit_curve_with, fit_inside, fit_tangent};
+use refine::{Fault, Spans};
+use solve::{Curve, Samples, fit_curve, fit_curve_with, fit_inside, fit_tangent};
 use tangent::{Tangency, end_planes, is_inside};
 
 /// How patches are fitted.
@@ -60,8 +62,7 @@ pub enum FitError {
 /// An element on its way to a patch.
 struct Fit {
     spans: usize,
-    points: Vec<DVec3>,
-    places: Vec<[f64; 2]>,
+    samples: Samples,
     patch: Patch,
 }
 
@@ -73,35 +74,29 @@ pub fn fit_patches(surface: &Surface, quads: &Quads, rules: &FitRules, watch: &W
     let surface = covered(surface, quads)?;
     let ground = Ground::new(&surface);
     let frame = frame(&ground, quads)?;
-    let mut spans = vec![1; frame.sides.len()];
     watch.phase("fit", None);
     let mut fits: Vec<Fit> = (0..frame.sides.len()).into_par_iter().map(|e| begin(&frame, e)).collect();
+    let mut spans = Spans::new(fits.len());
     loop {
         watch.check()?;
-        let mut curves = curves(&frame, &spans, rules);
-        fits.par_iter_mut().enumerate().for_each(|(e, fit)| fit.solve(&frame, e, spans[e], &curves, rules));
+        let counts = spans.counts();
+        let mut curves = curves(&frame, counts, rules);
+        fits.par_iter_mut().enumerate().for_each(|(e, fit)| fit.solve(&frame, e, counts[e], &curves, rules));
         if rules.smooth.is_some() {
             watch.check()?;
             level(&frame, &mut curves);
-            smooth(&frame, &mut fits, &spans, &curves, rules);
+            smooth(&frame, &mut fits, counts, &curves, rules);
         }
-        let errors = errors(&frame, &fits);
-        let bent = bent(&frame, &fits, rules);
         watch.check()?;
-        let mut refined = false;
-        for (e, error) in errors.iter().enumerate() {
-            fits[e].patch.max_error = error.0;
-            fits[e].patch.rms_error = error.1;
-            // With fewer than two vertices for each control point the fit would follow the triangles and swing between.
-            let unknown = (2 * spans[e] + 1) * (2 * spans[e] + 1);
-            let has_room = 2 * spans[e] <= rules.max_spans && 2 * unknown <= fits[e].points.len();
-            // More spans follow the facets of a coarse mesh more closely, so bends alone ask for two at most.
-            if (error.0 > rules.tolerance || bent[e] && spans[e] == 1) && has_room {
-                spans[e] *= 2;
-                refined = true;
-            }
+        let errors = errors(&frame, &fits);
+        let angles = angles(&frame, &fits);
+        for (fit, error) in fits.iter_mut().zip(&errors) {
+            (fit.patch.max_error, fit.patch.rms_error) = *error;
         }
-        if !refined {
+        let faults: Vec<Fault> =
+            errors.iter().zip(angles).map(|(error, angle)| Fault { error: error.0, angle }).collect();
+        let room: Vec<usize> = fits.iter().map(|fit| fit.samples.points.len()).collect();
+        if !spans.refine(&faults, &room, rules) {
             break;
         }
     }
@@ -112,19 +107,16 @@ pub fn fit_patches(surface: &Surface, quads: &Quads, rules: &FitRules, watch: &W
 }
 
 fn begin(frame: &Frame<'_>, element: usize) -> Fit {
-    let (inside, places) = flatten::flatten(frame, element);
-    let points = inside.iter().map(|&v| frame.layout.ground.point(v)).collect();
-    Fit { spans: 0, points, places, patch: Patch::default() }
+    Fit { spans: 0, samples: flatten::flatten(frame, element), patch: Patch::default() }
 }
 
-/// The elements with a smooth seam whose planes differ by more than the rules allow.
-fn bent(frame: &Frame<'_>, fits: &[Fit], rules: &FitRules) -> Vec<bool> {
-    let mut bent = vec![false; fits.len()];
-    let Some(most) = rules.smooth else { return bent };
-    for seam in seams(frame, fits).into_iter().filter(|seam| seam.is_smooth && seam.angle > most) {
-        seam.patches.iter().for_each(|&e| bent[e as usize] = true);
+/// For each element the largest angle between planes along its smooth seams; degrees.
+fn angles(frame: &Frame<'_>, fits: &[Fit]) -> Vec<f64> {
+    let mut angles = vec![0.0_f64; fits.len()];
+    for seam in seams(frame, fits).into_iter().filter(|seam| seam.is_smooth) {
+        seam.patches.iter().for_each(|&e| angles[e as usize] = angles[e as usize].max(seam.angle));
     }
-    bent
+    angles
 }
 
 /// Curves that leave each node in the planes that their sectors have there.
@@ -138,7 +130,7 @@ fn level(frame: &Frame<'_>, curves: &mut [Curve]) {
         };
         let next = [into(0, 1, planes[arc][0]), into(n - 1, n - 2, planes[arc][1])];
         if next.iter().any(Option::is_some) {
-            *curve = fit_curve_with(&path_points(frame, &frame.arcs[arc]), curve.spans, next);
+            *curve = fit_curve_with(&frame.arcs[arc].points, curve.spans, next);
         }
     });
 }
@@ -149,7 +141,7 @@ fn smooth(frame: &Frame<'_>, fits: &mut [Fit], spans: &[usize], curves: &[Curve]
     const ROUNDS: usize = 3;
     fits.par_iter_mut().enumerate().for_each(|(e, fit)| {
         fit.set_border(frame, e, spans[e], curves);
-        fit_inside(&mut fit.patch, &fit.points, &fit.places, rules.fairness);
+        fit_inside(&mut fit.patch, &fit.samples, rules.fairness);
     });
     // Planes are chosen once: later ones would follow what they made.
     let normals: Vec<Vec<(f64, DVec3)>> =
@@ -161,6 +153,8 @@ fn smooth(frame: &Frame<'_>, fits: &mut [Fit], spans: &[usize], curves: &[Curve]
 
 /// Along a smooth seam: shares of the curve, with the normal midway between both patches and across the curve.
 fn seam_normals(frame: &Frame<'_>, fits: &[Fit], curves: &[Curve], arc: usize) -> Vec<(f64, DVec3)> {
+    /// Cosine between normals that tell the same plane.
+    const ALIKE: f64 = 0.7;
     if !is_inside(frame, arc) {
         return Vec::new();
     }
@@ -173,11 +167,15 @@ fn seam_normals(frame: &Frame<'_>, fits: &[Fit], curves: &[Curve], arc: usize) -
         let tangent = tangent(t)?;
         (normal - tangent * normal.dot(tangent)).try_normalize()
     };
+    let of_mesh = path_normals(frame, &frame.arcs[arc]);
     let normal_at = |k: usize| {
         let t = (k as f64 + 0.5) / places as f64;
-        let [a, b] = at_seam(frame, arc, t)?;
-        let [na, nb] = [a, b].map(|(e, uv)| normal(&fits[e].patch, uv));
-        Some((t, across(t, na + nb)?))
+        let mesh = of_mesh[of_mesh.partition_point(|&(end, _)| end < t).min(of_mesh.len() - 1)].1;
+        // Next to a flat corner a patch may be folded: its normal then points the other way, or anywhere.
+        let sides = at_seam(frame, arc, t)?.map(|(e, uv)| normal(&fits[e].patch, uv));
+        let [na, nb] = sides.map(|n| if n.dot(mesh) < 0.0 { -n } else { n });
+        let sum = if na.dot(nb) > ALIKE && mesh.dot(na + nb) > ALIKE { na + nb } else { mesh };
+        Some((t, across(t, sum)?))
     };
     let raw: Vec<(f64, DVec3)> = (0..places).filter_map(normal_at).collect();
     smoothed(&raw).into_iter().filter_map(|(t, normal)| Some((t, across(t, normal)?))).collect()
@@ -197,12 +195,18 @@ fn smoothed(normals: &[(f64, DVec3)]) -> Vec<(f64, DVec3)> {
     normals.iter().filter_map(|&(t, _)| Some((t, at(t).try_normalize()?))).collect()
 }
 
-fn path_points(frame: &Frame<'_>, arc: &frame::Arc) -> Vec<DVec3> {
-    let mut points: Vec<DVec3> = arc.path.iter().map(|&v| frame.layout.ground.point(v)).collect();
-    if points.len() == 2 {
-        points.insert(1, points[0].midpoint(points[1]));
-    }
-    points
+/// The mean normal of the faces beside each edge of a path, with the share of the length at which the edge ends.
+fn path_normals(frame: &Frame<'_>, arc: &frame::Arc) -> Vec<(f64, DVec3)> {
+    let ground = frame.layout.ground;
+    let mut at = 0.0;
+    let edge = |w: &[VertexId]| {
+        let sides = [ground.side_between(w[0], w[1]), ground.side_between(w[1], w[0])];
+        at += ground.point(w[0]).distance(ground.point(w[1]));
+        (at, sides.into_iter().flatten().map(|side| ground.normal(side.face)).sum::<DVec3>().normalize_or_zero())
+    };
+    let mut normals: Vec<(f64, DVec3)> = arc.path.windows(2).map(edge).collect();
+    normals.iter_mut().for_each(|(end, _)| *end /= at.max(f64::MIN_POSITIVE));
+    normals
 }
 
 /// The curves of all arcs, each with the spans of the finer element beside it.
@@ -214,7 +218,7 @@ fn curves(frame: &Frame<'_>, spans: &[usize], rules: &FitRules) -> Vec<Curve> {
         while count < wanted && 2 * count < arc.path.len() {
             count *= 2;
         }
-        fit_curve(&path_points(frame, arc), count.min(wanted).min(rules.max_spans))
+        fit_curve(&arc.points, count.min(wanted).min(rules.max_spans))
     };
     frame.arcs.par_iter().map(fit).collect()
 }
@@ -226,10 +230,10 @@ impl Fit {
         const ROUNDS: usize = 3;
         self.set_border(frame, element, spans, curves);
         for _ in 0..ROUNDS {
-            fit_inside(&mut self.patch, &self.points, &self.places, rules.fairness);
+            fit_inside(&mut self.patch, &self.samples, rules.fairness);
             self.correct();
         }
-        fit_inside(&mut self.patch, &self.points, &self.places, rules.fairness);
+        fit_inside(&mut self.patch, &self.samples, rules.fairness);
     }
 
     /// Starts from the curves given.
@@ -251,13 +255,35 @@ impl Fit {
         self.patch = with_border(most, &border);
     }
 
-    /// Fits the inside with the derivatives across smooth seams in the planes given.
+    /// Fits the inside with the derivatives across smooth seams in the planes given, as far as the tolerance allows.
     fn solve_tangent(&mut self, frame: &Frame<'_>, element: usize, normals: &[Vec<(f64, DVec3)>], rules: &FitRules) {
-        /// A slope of one counts as much as a distance of this many times the tolerance: two degrees as three and a half.
-        const REACH: f64 = 100.0;
+        /// A slope of one counts as much as a distance of so many times the tolerance: of 100, two degrees as three and
+        /// a half. Less where the patch would leave the tolerance for it.
+        const REACH: [f64; 4] = [100.0, 30.0, 10.0, 3.0];
         /// The thin-plate term counts more here, for slopes alone leave room to swing.
         const FAIR: f64 = 1e-3;
+        let planes = self.tangencies(frame, element, normals);
+        if planes.is_empty() {
+            return;
+        }
+        let fairness = rules.fairness.max(FAIR);
+        let before = (self.patch.clone(), self.samples.places.clone());
+        for reach in REACH {
+            fit_tangent(&mut self.patch, &self.samples, fairness, (&planes, reach * rules.tolerance));
+            self.correct();
+            if self.error() <= rules.tolerance {
+                return;
+            }
+            (self.patch, self.samples.places) = before.clone();
+        }
+    }
+
+    /// Where the patch shall have the planes given.
+    fn tangencies(&self, frame: &Frame<'_>, element: usize, normals: &[Vec<(f64, DVec3)>]) -> Vec<Tangency> {
+        /// Of the patch's size, what a derivative counts as at least.
+        const LEAST: f64 = 0.2;
         let sides = &frame.sides[element];
+        let size = self.samples.weights.iter().sum::<f64>().max(0.0).sqrt().max(f64::MIN_POSITIVE);
         let mut planes = Vec::new();
         for (side, &(arc, is_along)) in sides.iter().enumerate() {
             for &(t, normal) in &normals[arc] {
@@ -265,23 +291,22 @@ impl Fit {
                 // Of a triangle the side v = 1 is a point, and the last side is u = 0.
                 let is_along_u = side % 2 == 1 || sides.len() == 3 && side == 2;
                 let [_, su, sv] = self.patch.eval(place[0], place[1]);
-                let length = if is_along_u { su } else { sv }.length();
-                if length > 0.0 {
-                    planes.push(Tangency { place, is_along_u, normal: normal / length });
-                }
+                // Next to a flat corner the derivative is about nothing, and must not count without bound for that.
+                let length = if is_along_u { su } else { sv }.length().max(LEAST * size);
+                planes.push(Tangency { place, is_along_u, normal: normal / length });
             }
         }
-        if planes.is_empty() {
-            return;
-        }
-        let reach = REACH * rules.tolerance;
-        let fairness = rules.fairness.max(FAIR);
-        fit_tangent(&mut self.patch, &self.points, &self.places, fairness, (&planes, reach));
-        self.correct();
+        planes
+    }
+
+    /// The largest distance of a sample from the point of the patch that it belongs to.
+    fn error(&self) -> f64 {
+        let pairs = self.samples.points.iter().zip(&self.samples.places);
+        pairs.map(|(&p, &[u, v])| self.patch.point(u, v).distance(p)).fold(0.0, f64::max)
     }
 
     fn correct(&mut self) {
-        for (place, &p) in self.places.iter_mut().zip(&self.points) {
+        for (place, &p) in self.samples.places.iter_mut().zip(&self.samples.points) {
             *place = self.patch.foot(p, *place);
         }
     }
@@ -347,7 +372,7 @@ fn errors(frame: &Frame<'_>, fits: &[Fit]) -> Vec<(f64, f64)> {
     let tree = TriangleBvh::of_surface(&sample::triangles(&fine));
     let ground = frame.layout.ground;
     let of_element = |(e, fit): (usize, &Fit)| {
-        let own = fit.points.iter().zip(&fit.places).map(|(&p, &place)| {
+        let own = fit.samples.points.iter().zip(&fit.samples.places).map(|(&p, &place)| {
             let [u, v] = fit.patch.foot(p, place);
             let own = fit.patch.point(u, v).distance(p);
             tree.closest_within(p, own * own).map_or(own, |near| near.distance().min(own))

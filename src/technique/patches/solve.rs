@@ -79,7 +79,7 @@ pub fn fit_curve_with(points: &[DVec3], spans: usize, next: [Option<DVec3>; 2]) 
         for share in [0.25, 0.75] {
             let (first, value, _) = basis(spans, ((at[0] + (at[1] - at[0]) * share) / total).min(1.0));
             let row: Vec<(usize, f64)> = (0..4).map(|k| (first + k, value[k])).collect();
-            system.sample(&row, pair[0].lerp(pair[1], share));
+            system.sample(&row, pair[0].lerp(pair[1], share), 1.0);
         }
     }
     system.fix(0, first);
@@ -90,6 +90,17 @@ pub fn fit_curve_with(points: &[DVec3], spans: usize, next: [Option<DVec3>; 2]) 
         }
     }
     system.solve().map_or_else(fallback, |controls| Curve { spans, controls })
+}
+
+/// Points that a patch shall pass through, with their parameters.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Samples {
+    /// The points; mesh units.
+    pub points: Vec<DVec3>,
+    /// For each the parameters in the unit square.
+    pub places: Vec<[f64; 2]>,
+    /// How much each counts, such as the area around it: vertices may crowd where nothing is to be seen.
+    pub weights: Vec<f64>,
 }
 
 /// Normal equations for points, of which some are given.
@@ -115,8 +126,9 @@ impl System {
         }
     }
 
-    fn sample(&mut self, row: &[(usize, f64)], p: DVec3) {
+    fn sample(&mut self, row: &[(usize, f64)], p: DVec3, weight: f64) {
         for &(i, a) in row {
+            let a = a * weight;
             for &(j, b) in row {
                 self.data[(i, j)] += a * b;
             }
@@ -217,24 +229,19 @@ impl System {
     }
 }
 
-/// Fills in the inner control points of a patch whose border is given, so that it fits `points` at `places`.
-pub fn fit_inside(patch: &mut Patch, points: &[DVec3], places: &[[f64; 2]], fairness: f64) {
-    if let Some(controls) = system_inside(patch, points, places, fairness).solve() {
+/// Fills in the inner control points of a patch whose border is given, so that it fits the samples.
+pub fn fit_inside(patch: &mut Patch, samples: &Samples, fairness: f64) {
+    if let Some(controls) = system_inside(patch, samples, fairness).solve() {
         patch.controls = controls;
     }
 }
 
 /// As [`fit_inside`], with derivatives across the border drawn into planes: a slope of one counts as a distance of
-/// `reach` at as many samples as there are points.
-pub fn fit_tangent(
-    patch: &mut Patch,
-    points: &[DVec3],
-    places: &[[f64; 2]],
-    fairness: f64,
-    (planes, reach): (&[Tangency], f64),
-) {
-    let mut system = system_inside(patch, points, places, fairness);
-    let weight = reach * reach * points.len().max(1) as f64 / planes.len().max(1) as f64;
+/// `reach` at as many samples as there are.
+pub fn fit_tangent(patch: &mut Patch, samples: &Samples, fairness: f64, (planes, reach): (&[Tangency], f64)) {
+    let mut system = system_inside(patch, samples, fairness);
+    let all: f64 = samples.weights.iter().sum();
+    let weight = reach * reach * all.max(f64::MIN_POSITIVE) / planes.len().max(1) as f64;
     for plane in planes {
         let row = slope(patch, plane.place, plane.is_along_u);
         system.tangent.push((row, plane.normal * weight.sqrt()));
@@ -244,7 +251,7 @@ pub fn fit_tangent(
     }
 }
 
-fn system_inside(patch: &Patch, points: &[DVec3], places: &[[f64; 2]], fairness: f64) -> System {
+fn system_inside(patch: &Patch, samples: &Samples, fairness: f64) -> System {
     let (w, h) = (patch.width(), patch.spans[1] + 3);
     let mut system = System::new(w * h, fairness);
     let at = |i: usize, j: usize| j * w + i;
@@ -265,8 +272,8 @@ fn system_inside(patch: &Patch, points: &[DVec3], places: &[[f64; 2]], fairness:
             }
         }
     }
-    for (&p, &[u, v]) in points.iter().zip(places) {
-        system.sample(&tensor(patch, u, v), p);
+    for ((&p, &[u, v]), &weight) in samples.points.iter().zip(&samples.places).zip(&samples.weights) {
+        system.sample(&tensor(patch, u, v), p, weight);
     }
     system
 }
@@ -327,7 +334,8 @@ mod tests {
             let places: Vec<[f64; 2]> =
                 (0..400).map(|k| [f64::from(k % 20) / 19.0, f64::from(k / 20) / 19.0]).collect();
             let points: Vec<DVec3> = places.iter().map(|p| bicubic(p[0], p[1])).collect();
-            fit_inside(&mut patch, &points, &places, 1e-6);
+            let weights = (0..400).map(|k| 1.0 + f64::from(k % 7)).collect();
+            fit_inside(&mut patch, &Samples { points, places, weights }, 1e-6);
             for k in 0..121 {
                 let [u, v] = [f64::from(k % 11) / 10.0, f64::from(k / 11) / 10.0];
                 let error = patch.point(u, v).distance(bicubic(u, v));
