@@ -2,8 +2,9 @@
 //!
 //! # Algorithm
 //! Curves over the common paths of elements come first, by least squares with both ends fixed; then the patches inside,
-//! by least squares over the covered vertices with a thin-plate term and corrected parameters. Patches beyond the
-//! tolerance get twice the spans. With `g1` both patches of a smooth seam are drawn into common tangent planes. The work
+//! by least squares over the covered vertices, each by the area around it, with a thin-plate term and corrected
+//! parameters that start from mean value coordinates. Patches beyond the tolerance get twice the spans where that helps.
+//! With `g1` both patches of a smooth seam are drawn into common tangent planes, as far as the tolerance allows. The work
 //! is done by `technique::patches`.
 //!
 //! Based on: T. Itoh, A. Yamada, T. Furuhata, K. Inoue, K. Shimada. Rough Quadrilateralation of Triangular Meshes via
@@ -53,7 +54,8 @@ pub struct FitPatchesParams {
     #[schemars(range(min = 1, max = 256))]
     pub density: usize,
     /// Whether patches get common tangent planes along smooth seams, to within 2 degrees. Smooth are seams without a
-    /// marked edge where the surface bends by less than 20 degrees. Default false.
+    /// marked edge where the surface bends by less than 20 degrees. The tolerance comes first where a patch cannot hold
+    /// both; such seams are counted. Default false.
     pub g1: bool,
 }
 
@@ -180,7 +182,7 @@ pub struct Step;
 
 impl StepContract for Step {
     const NAME: &'static str = "fit-patches";
-    const REVISION: u32 = 6;
+    const REVISION: u32 = 4;
     const INPUTS: &'static [InputDef] = &[
         InputDef { name: "from", accepts: &[Port::Quads], required: true, doc: "coarse quads with what they cover" },
         InputDef {

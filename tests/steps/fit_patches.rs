@@ -67,3 +67,16 @@ fn smooth_seams_get_common_tangent_planes() {
     assert_eq!(smooth["seams-beyond"], 0, "{smooth}");
     assert!(smooth["max-error"].as_f64() <= smooth["tolerance"].as_f64(), "{smooth}");
 }
+
+#[test]
+fn crowded_vertices_and_long_triangles_do_not_bend_patches() {
+    let mut mesh = shapes::grid(60);
+    // Towards one side ever closer, so that triangles are up to a hundred times as long as wide.
+    mesh.points.iter_mut().for_each(|p| p.x = p.x * p.x * p.x);
+    mesh.points.iter_mut().for_each(|p| p.z = 0.15 * libm::sin(4.0 * p.x) * libm::cos(3.0 * p.y));
+    let from = surface(shapes::surface(&mesh));
+    let given = [("from", rough(&from)), ("surface", from.clone())];
+    let stats = run_locked("fit-patches", "main", "g1 = true", "", &given).unwrap().stats;
+    assert!(stats["max-error"].as_f64() <= stats["tolerance"].as_f64(), "{stats}");
+    assert_eq!(stats["seams-beyond"], 0, "{stats}");
+}
