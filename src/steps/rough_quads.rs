@@ -11,8 +11,9 @@
 //! Based on: T. Itoh, A. Yamada, T. Furuhata, K. Inoue, K. Shimada. Rough Quadrilateralation of Triangular Meshes via
 //! Belt-like Subregioning for Surface Reconstruction. IBM Research Report RT0354, 2000.
 //!
-//! Where elements do not fit between the edges of the mesh, faces there are cut in four and the belts made again; the
-//! cover says which ones, so that nobody needs the finer mesh.
+//! Where elements do not fit between the edges of the mesh, faces there are cut in four below the complex, which stays as
+//! it is, or before the belts are made again where these are no disks; the cover says which ones, so that nobody needs
+//! the finer mesh.
 //!
 //! # Invariants
 //! - Nodes are vertices of the surface, edges are paths over its edges, and paths never cross.
@@ -30,6 +31,11 @@
 //!   second spoke is drawn, as if its triangles were coupled at once: few edges meet in a vertex.
 //! - Closed surfaces, which the paper leaves open, are cut along the borders of their regions. The nodes there are dealt
 //!   out first, so that every region has an even number of them: an odd one leaves a triangle.
+//! - Loops that are sampled freely get an even number of nodes for the same reason, and holes smaller than a few elements
+//!   get theirs before connectors come to them, at least four.
+//! - A corner whose angle lies between two numbers of right angles takes either number of elements; so does a node on a
+//!   border that is coarse beside its curve, as round a small hole.
+//! - Where too many vertices are irregular, the interval is shortened step by step to three fifths.
 
 use std::sync::Arc;
 
@@ -38,14 +44,13 @@ use serde::{Deserialize, Serialize};
 
 use crate::mesh::geometry::Aabb;
 use crate::mesh::{FaceId, Quads, Surface};
-use crate::metric::quad_layout::{Layout as Counts, layout_counts};
+use crate::metric::quad_layout::Layout as Counts;
 use crate::step::{
     Artifact, ElementRef, InputDef, Inputs, Length, Locks, OutPort, OutputDef, Port, Produced, Step as StepContract,
     StepFailure,
 };
-use crate::technique::belts::{BeltReport, BeltRules, Order, Thickness, cut_belts};
-use crate::technique::layout::optimise::{OptimiseReport, optimise, polygonise};
-use crate::technique::layout::{Ground, Layout, Room, to_quads, with_rings};
+use crate::technique::belts::{Attempt, BeltRules, Narrow, Order, Thickness, attempt};
+use crate::technique::layout::Ground;
 use crate::watch::{Cancelled, Watch};
 
 /// Cuts a surface into coarse quads that follow its borders, each with the faces that it covers.
@@ -55,7 +60,8 @@ use crate::watch::{Cancelled, Watch};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default, rename_all = "kebab-case")]
 pub struct RoughQuadsParams {
-    /// How far apart the nodes on borders lie, which is about the size of the elements. Default 6 % of the diagonal.
+    /// How far apart the nodes on borders lie, which is about the size of the elements. Default 6 % of the diagonal. With
+    /// `optimize` shorter ones, down to three fifths, are tried where too many vertices would be irregular.
     pub interval: Length,
     /// How thick belts are: a length, or strips of triangles as a table `{ strips = 8 }`. Default: as `interval`.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -64,7 +70,7 @@ pub struct RoughQuadsParams {
     #[schemars(range(min = 90.0, max = 180.0))]
     pub min_angle: f64,
     /// Whether connectivity is improved after the paper's post-processing: triangles are paired along paths, nodes with
-    /// too many or too few elements are repaired; of several orders in which belts are cut the best result is
+    /// too many or too few elements are repaired; of several ways in which belts are cut the best result is
     /// kept. Default true; `false` is the paper's method, from the outside.
     pub optimize: bool,
 }
@@ -162,39 +168,26 @@ pub fn rough_quads(
     watch: &Watch,
 ) -> Result<(Quads, RoughQuadsStats), RoughQuadsError> {
     let rules = rules(surface, params)?;
-    let mut room = Room::new(surface);
-    loop {
-        let ground = Ground::new(&room.surface);
-        check_borders(&ground)?;
-        let made = if params.optimize {
-            best(&ground, &rules, params, watch)?
-        } else {
-            attempt(&ground, &rules, params, watch)?
-        };
-        match made {
-            Ok(made) => return Ok(finish(surface, &ground, made, &room)),
-            Err(narrow) => {
-                let places = room.origins(&narrow.places);
-                let around = with_rings(&ground, &narrow.around);
-                if !room.cut(around)? {
-                    return Err(RoughQuadsError::TooCoarse { faces: places });
-                }
-            }
-        }
-    }
+    check_borders(&Ground::new(surface))?;
+    let made = match params.optimize {
+        true => best(surface, &rules, watch)?,
+        false => attempt(surface, &rules, false, &mut Vec::new(), watch)?,
+    };
+    made.map(|made| finish(surface, made)).map_err(|narrow| RoughQuadsError::TooCoarse { faces: narrow.places })
 }
 
-fn finish(surface: &Surface, ground: &Ground<'_>, made: Attempt, room: &Room) -> (Quads, RoughQuadsStats) {
+fn finish(surface: &Surface, made: Attempt) -> (Quads, RoughQuadsStats) {
     let mut quads = made.quads;
+    let cut_faces = made.cuts.iter().map(Vec::len).sum();
     if let Some(cover) = &mut quads.cover {
         cover.surface = surface.shape_hash();
-        cover.cuts.clone_from(&room.cuts);
+        cover.cuts = made.cuts;
     }
     let Counts { triangles, irregular, forced, vertices } = made.counts;
     let elements = quads.mesh.faces.len();
     let stats = RoughQuadsStats {
-        domains: ground.domains,
-        cut_faces: room.cuts.iter().map(Vec::len).sum(),
+        domains: made.domains,
+        cut_faces,
         strips: made.belts.strips,
         belts: made.belts.belts,
         connectors: made.belts.connectors,
@@ -211,122 +204,51 @@ fn finish(surface: &Surface, ground: &Ground<'_>, made: Attempt, room: &Room) ->
     (quads, stats)
 }
 
-/// Where elements do not fit between the edges of the mesh.
-struct Narrow {
-    /// A face at each place.
-    places: Vec<FaceId>,
-    /// The faces that would have to be smaller.
-    around: Vec<FaceId>,
-}
+/// In which ways belts are cut: their order, how near connectors join a node, and how many times as far apart nodes lie.
+/// Shorter intervals come last: where limbs or holes are hardly wider than one element, there is no regular layout of
+/// elements of the size asked for.
+const WAYS: [(Order, f64, f64); 6] = [
+    (Order::FromOutside, SNAP, 1.0),
+    (Order::FromBorders, 0.5, 1.0),
+    (Order::FromOutside, SNAP, 0.9),
+    (Order::FromOutside, SNAP, 0.8),
+    (Order::FromBorders, 0.5, 0.7),
+    (Order::FromOutside, SNAP, 0.6),
+];
 
-/// Quads made by one order of the belts.
-struct Attempt {
-    quads: Quads,
-    counts: Counts,
-    belts: BeltReport,
-    post_processed: usize,
-    report: OptimiseReport,
-}
-
-fn attempt(
-    ground: &Ground<'_>,
-    rules: &BeltRules,
-    params: &RoughQuadsParams,
-    watch: &Watch,
-) -> Result<Result<Attempt, Narrow>, Cancelled> {
-    let (mut layout, bad, belts) = cut_belts(ground, rules, watch)?;
-    if !bad.is_empty() {
-        return Ok(Err(narrow(&layout, bad.iter().map(|b| b.cell))));
-    }
-    let mut stuck = polygonise(&mut layout, watch)?;
-    if !stuck.is_empty() {
-        return Ok(Err(narrow(&layout, stuck.into_iter())));
-    }
-    let mut post_processed = layout.couple_triangles() + layout.open_triangles();
-    post_processed += layout.couple_triangles();
-    let mut report = OptimiseReport::default();
-    if params.optimize {
-        report = optimise(&mut layout, watch)?;
-        stuck = polygonise(&mut layout, watch)?;
-    }
-    part_parallels(&mut layout, &mut stuck, watch)?;
-    let odd = layout.cells().filter(|&c| !(3..=4).contains(&layout.ring(c).len()));
-    let left: Vec<u32> = stuck.into_iter().filter(|&c| layout.exists(c)).chain(odd).collect();
-    if !left.is_empty() {
-        return Ok(Err(narrow(&layout, left.into_iter())));
-    }
-    let quads = to_quads(&layout);
-    let counts = layout_counts(&quads.mesh);
-    Ok(Ok(Attempt { quads, counts, belts, post_processed, report }))
-}
-
-/// These cells, which are too narrow, with what lies round them.
-fn narrow(layout: &Layout<'_>, cells: impl Iterator<Item = u32>) -> Narrow {
-    let mut cells: Vec<u32> = cells.collect();
-    cells.sort_unstable();
-    cells.dedup();
-    let mut places: Vec<FaceId> = cells.iter().filter_map(|&c| layout.faces(c).iter().min().copied()).collect();
-    places.sort_unstable();
-    Narrow { places, around: cells.iter().flat_map(|&c| layout.faces(c)).copied().collect() }
-}
-
-/// The best of several ways to cut the belts; the first that is good enough ends the search, and so does the first one
-/// where it finds no room.
-fn best(
-    ground: &Ground<'_>,
-    rules: &BeltRules,
-    params: &RoughQuadsParams,
-    watch: &Watch,
-) -> Result<Result<Attempt, Narrow>, Cancelled> {
-    const OTHERS: [(Order, f64); 3] =
-        [(Order::FromBorders, 0.5), (Order::FromOutside, 0.5), (Order::FromBorders, SNAP)];
-    let mut best = match attempt(ground, rules, params, watch)? {
-        Ok(made) => made,
-        Err(narrow) => return Ok(Err(narrow)),
-    };
-    for (order, snap) in OTHERS {
-        if best.is_good() {
-            break;
-        }
-        if let Ok(made) = attempt(ground, &BeltRules { order, snap, ..*rules }, params, watch)?
-            && made.shares() < best.shares()
-        {
-            best = made;
+/// The best of several ways to cut the belts; the first that is good enough ends the search.
+fn best(surface: &Surface, rules: &BeltRules, watch: &Watch) -> Result<Result<Attempt, Narrow>, Cancelled> {
+    let (mut known, mut best) = (Vec::new(), None);
+    let mut narrow = Narrow { places: Vec::new() };
+    for (order, snap, scale) in WAYS {
+        let (interval, thickness) = (rules.interval * scale, rules.thickness.scaled(scale));
+        let way = BeltRules { order, snap, interval, thickness, ..*rules };
+        match attempt(surface, &way, true, &mut known, watch)? {
+            Ok(made) => {
+                let excess = excess(&made.counts, made.quads.mesh.faces.len());
+                if best.as_ref().is_none_or(|(least, _)| excess < *least) {
+                    best = Some((excess, made));
+                }
+                if excess.iter().all(|&e| e <= 1.0) {
+                    break;
+                }
+            }
+            Err(found) if narrow.places.is_empty() => narrow = found,
+            Err(_) => {}
         }
     }
-    Ok(Ok(best))
+    Ok(best.map(|best| best.1).ok_or(narrow))
 }
 
-impl Attempt {
-    /// The shares of triangles and of irregular vertices.
-    fn shares(&self) -> [f64; 2] {
-        let share = |count: usize, of: usize| count as f64 / of.max(1) as f64;
-        let Counts { triangles, irregular, vertices, .. } = &self.counts;
-        [share(*triangles, self.quads.mesh.faces.len()), share(irregular.len(), *vertices)]
-    }
-
-    /// Whether another way is not worth its time.
-    fn is_good(&self) -> bool {
-        /// Shares that the paper's own examples keep.
-        const GOOD: [f64; 2] = [0.03, 0.1];
-        let [triangles, irregular] = self.shares();
-        let forced = self.counts.forced as f64 / self.counts.vertices.max(1) as f64;
-        triangles <= GOOD[0] && irregular <= GOOD[1].max(1.25 * forced)
-    }
-}
-
-/// Parts edges between the same two nodes, and what becomes of the cells beside them.
-fn part_parallels(layout: &mut Layout<'_>, stuck: &mut Vec<u32>, watch: &Watch) -> Result<(), Cancelled> {
-    /// Cutting the cells beside may make new ones.
-    const ROUNDS: usize = 4;
-    for _ in 0..ROUNDS {
-        if layout.part_parallels() == 0 {
-            break;
-        }
-        *stuck = polygonise(layout, watch)?;
-        layout.couple_triangles();
-    }
-    Ok(())
+/// The shares of triangles and of irregular vertices beside those that are good enough: up to 1 another way is not worth
+/// its time.
+fn excess(counts: &Counts, elements: usize) -> [f64; 2] {
+    /// Shares that the paper's own examples keep.
+    const GOOD: [f64; 2] = [0.03, 0.1];
+    let Counts { triangles, irregular, forced, vertices } = counts;
+    let share = |count: usize, of: usize| count as f64 / of.max(1) as f64;
+    let bar = GOOD[1].max(1.25 * share(*forced, *vertices));
+    [(share(*triangles, elements) / GOOD[0]).max(1.0), share(irregular.len(), *vertices) / bar]
 }
 
 /// How near to a node, as a share of the interval, a connector joins it; less leaves rows apart that should be one, more
@@ -394,7 +316,7 @@ pub struct Step;
 
 impl StepContract for Step {
     const NAME: &'static str = "rough-quads";
-    const REVISION: u32 = 3;
+    const REVISION: u32 = 4;
     const INPUTS: &'static [InputDef] = &[InputDef {
         name: "from",
         accepts: &[Port::Surface],

@@ -154,7 +154,7 @@ impl Draft<'_> {
         let open = |l: FaceId, r: FaceId| self.is_open(l, r, belt);
         let cost = along(a, b);
         let limit = DETOUR * a.distance(b).max(0.5 * self.interval);
-        let terrain = Terrain { free: &free, open: &open, cost: &cost, limit };
+        let terrain = Terrain { free: &free, open: &open, cost: &cost, limit, goal: Some(b) };
         let path = finder.path(self.ground, &[start], |v| v == end, &terrain);
         self.finder = finder;
         path

@@ -35,10 +35,24 @@ pub(super) struct Draft<'g> {
     pub(super) connectors: usize,
 }
 
+/// Gives small holes their nodes before connectors come to them, which would leave them too few and an odd number.
+fn sample_small(ground: &Ground<'_>, node: &mut IdVec<Vertex, bool>, interval: f64) {
+    /// Loops shorter than this many intervals.
+    const SMALL: f64 = 5.0;
+    for sides in border_loops(ground, &ground.domain) {
+        let rope = Rope::new(ground, &sides);
+        let is_hole = sides.iter().all(|&side| ground.beyond(side).is_none());
+        if is_hole && rope.length < SMALL * interval {
+            fill_gaps(&rope, node, interval, |_| true);
+        }
+    }
+}
+
 impl<'g> Draft<'g> {
     pub(super) fn new(ground: &'g Ground<'g>, belts: Belts, rules: &BeltRules) -> Self {
         let (mut node, fixed) = forced(ground, &belts, rules.interval);
         let settled = settle(ground, &mut node, rules.interval);
+        sample_small(ground, &mut node, rules.interval);
         Self {
             ground,
             interval: rules.interval,

@@ -80,6 +80,7 @@ impl Draft<'_> {
             open: &open,
             cost: &|a, b| a.distance(b),
             limit: f64::INFINITY,
+            goal: None,
         };
         let path = finder.path(ground, from, |v| to.contains(&v), &terrain);
         self.finder = finder;

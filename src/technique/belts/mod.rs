@@ -2,6 +2,7 @@
 //!
 //! See the step `rough-quads` for the method; this is the part that both of its modes share.
 
+mod attempt;
 mod connect;
 mod draft;
 mod even;
@@ -11,6 +12,7 @@ mod spine;
 mod strips;
 mod walk;
 
+pub use attempt::{Attempt, Narrow, attempt};
 pub use strips::Thickness;
 
 use crate::mesh::carried::edge_key;

@@ -41,6 +41,14 @@ impl Rope {
         if gap > 0.0 { gap } else { gap + self.length }
     }
 
+    /// Whether one of the vertices within `reach` of place `k` along the loop is `wanted`.
+    fn is_any_near(&self, k: usize, reach: f64, wanted: impl Fn(VertexId) -> bool) -> bool {
+        let n = self.len();
+        let ahead = (0..n).map(|step| (k + step) % n).take_while(|&j| j == k || self.between(k, j) <= reach);
+        let back = (0..n).map(|step| (k + n - step) % n).take_while(|&j| j == k || self.between(j, k) <= reach);
+        ahead.chain(back).any(|j| wanted(self.vertices[j]))
+    }
+
     /// The point `ahead` of place `k` along the loop; behind it where negative.
     fn point_at(&self, k: usize, ahead: f64) -> DVec3 {
         let n = self.len();
@@ -71,11 +79,6 @@ impl Rope {
 /// Corners of the domains' borders, and vertices where three belts, domains or the outside meet.
 pub(super) fn forced(ground: &Ground<'_>, belts: &Belts, interval: f64) -> (IdVec<Vertex, bool>, IdVec<Vertex, bool>) {
     let mut fixed = IdVec::filled(false, ground.surface.points.len());
-    for sides in border_loops(ground, &ground.domain) {
-        for v in corners(&Rope::new(ground, &sides), interval) {
-            fixed[v] = true;
-        }
-    }
     let mut node = fixed.clone();
     for v in ground.surface.points.ids() {
         let faces = ground.faces_at.of(v);
@@ -85,30 +88,46 @@ pub(super) fn forced(ground: &Ground<'_>, belts: &Belts, interval: f64) -> (IdVe
         let outside = usize::from(ground.on_rim[v]);
         if fans(ground, &belts.of, v).len() + outside >= 3 {
             node[v] = true;
-            fixed[v] |= fans(ground, &ground.domain, v).len() + outside >= 3;
+            fixed[v] = fans(ground, &ground.domain, v).len() + outside >= 3;
         }
+    }
+    corners(ground, interval, &mut fixed);
+    for v in node.ids() {
+        node[v] |= fixed[v];
     }
     (node, fixed)
 }
 
-/// Vertices where a loop turns by more than 45 degrees over a short arm; of close ones the sharpest.
-fn corners(rope: &Rope, interval: f64) -> Vec<VertexId> {
-    let arm = interval / 4.0;
-    let turn = |k: usize| {
-        let (ahead, back) = rope.arms(k, arm);
-        std::f64::consts::PI - crate::mesh::geometry::angle(ahead, back)
-    };
-    let mut sharp: Vec<(f64, usize)> = (0..rope.len()).map(|k| (turn(k), k)).filter(|s| s.0 > CORNER).collect();
-    sharp.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-    let mut kept: Vec<usize> = Vec::new();
-    for (_, k) in sharp {
-        let apart =
-            |&other: &usize| rope.between(k, other).min(rope.between(other, k)) > 1.5 * arm.min(rope.length / 6.0);
-        if kept.iter().all(apart) {
-            kept.push(k);
+/// Fixes vertices where a border turns by more than 45 degrees over a short arm; of close ones the sharpest, whichever
+/// domain it is a corner of.
+fn corners(ground: &Ground<'_>, interval: f64, fixed: &mut IdVec<Vertex, bool>) {
+    let loops = border_loops(ground, &ground.domain);
+    let ropes: Vec<(Rope, f64)> = loops
+        .iter()
+        .map(|sides| {
+            let rope = Rope::new(ground, sides);
+            // Over longer arms a small round hole would turn everywhere, and a small square one would lose corners.
+            let arm = (interval / 4.0).min(rope.length / 12.0);
+            (rope, arm)
+        })
+        .collect();
+    let mut sharp: Vec<(f64, usize, usize)> = Vec::new();
+    for (number, (rope, arm)) in ropes.iter().enumerate() {
+        for k in 0..rope.len() {
+            let (ahead, back) = rope.arms(k, *arm);
+            let turn = std::f64::consts::PI - crate::mesh::geometry::angle(ahead, back);
+            if turn > CORNER {
+                sharp.push((turn, number, k));
+            }
         }
     }
-    kept.into_iter().map(|k| rope.vertices[k]).collect()
+    sharp.sort_by(|a, b| b.0.total_cmp(&a.0).then((a.1, a.2).cmp(&(b.1, b.2))));
+    for (_, number, k) in sharp {
+        let (rope, arm) = &ropes[number];
+        if !rope.is_any_near(k, 1.5 * arm, |v| fixed[v]) {
+            fixed[rope.vertices[k]] = true;
+        }
+    }
 }
 
 /// Adds nodes to a loop so that they lie about `interval` apart; gaps for which `may_fill` is false keep fewer.
@@ -120,18 +139,62 @@ pub(super) fn fill_gaps(rope: &Rope, node: &mut IdVec<Vertex, bool>, interval: f
         places.push(lowest);
     }
     let gaps = places.len();
-    for g in 0..gaps {
-        let (a, b) = (places[g], places[(g + 1) % gaps]);
-        let length = rope.between(a, b);
-        let least = [4, 2][usize::from(gaps > 1)].max(if gaps > 2 { 1 } else { 2 });
-        let mut parts = (length / interval).round() as usize;
-        parts = if gaps > 2 { parts.max(1) } else { parts.max(least) };
-        if !may_fill(a) && length < 1.8 * interval && gaps > 2 {
-            parts = 1;
-        }
-        for part in 1..parts {
-            let place = rope.place_near(a, length * part as f64 / parts as f64);
+    let length = |g: usize| rope.between(places[g], places[(g + 1) % gaps]);
+    let mut parts: Vec<usize> = (0..gaps)
+        .map(|g| {
+            let least = [4, 2][usize::from(gaps > 1)].max(if gaps > 2 { 1 } else { 2 });
+            let wanted = (length(g) / interval).round() as usize;
+            if !may_fill(places[g]) && length(g) < 1.8 * interval && gaps > 2 {
+                1
+            } else {
+                wanted.max(if gaps > 2 { 1 } else { least })
+            }
+        })
+        .collect();
+    if places.iter().all(|&k| may_fill(k)) {
+        make_even(&mut parts, |g| length(g) / interval);
+    }
+    for (g, &count) in parts.iter().enumerate() {
+        for part in 1..count {
+            let place = rope.place_near(places[g], length(g) * part as f64 / count as f64);
             node[rope.vertices[place]] = true;
         }
+    }
+}
+
+/// Gives one of the gaps of a loop a part more where their number is odd, or one less: an odd loop leaves a triangle.
+fn make_even(parts: &mut [usize], wanted: impl Fn(usize) -> f64) {
+    if parts.iter().sum::<usize>() % 2 == 0 {
+        return;
+    }
+    let least = if parts.len() > 2 { 1 } else { 2 };
+    let mut best: Option<(f64, usize, usize)> = None;
+    for (g, &count) in parts.iter().enumerate() {
+        for other in [count + 1, count - 1] {
+            let cost = libm::log(other as f64 / wanted(g).max(0.1)).abs();
+            if other >= least && best.is_none_or(|b| cost < b.0) {
+                best = Some((cost, g, other));
+            }
+        }
+    }
+    if let Some((_, g, other)) = best {
+        parts[g] = other;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_odd_loop_changes_where_lengths_change_least() {
+        // Gaps of 1.0, 4.4 and 2.0 intervals: four parts become five rather than one two.
+        let lengths = [1.0, 4.4, 2.0];
+        let mut parts = [1, 4, 2];
+        make_even(&mut parts, |g| lengths[g]);
+        assert_eq!(parts, [1, 5, 2]);
+        let mut alone = [5];
+        make_even(&mut alone, |_| 4.6);
+        assert_eq!(alone, [4]);
     }
 }

@@ -104,7 +104,7 @@ impl Draft<'_> {
         let free = |v: VertexId| self.is_free(v, belt) && shunned.binary_search(&v).is_err();
         let open = |a: FaceId, b: FaceId| self.belts.of[a] == belt && self.belts.of[b] == belt;
         let cost = |a: DVec3, b: DVec3| a.distance(b);
-        let terrain = Terrain { free: &free, open: &open, cost: &cost, limit: f64::INFINITY };
+        let terrain = Terrain { free: &free, open: &open, cost: &cost, limit: f64::INFINITY, goal: None };
         let path = finder.path(self.ground, sources, |v| sorted.binary_search(&v).is_ok(), &terrain);
         self.finder = finder;
         path

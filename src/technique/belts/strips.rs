@@ -20,6 +20,17 @@ pub enum Thickness {
     Length(f64),
 }
 
+impl Thickness {
+    /// So many times as thick.
+    #[must_use]
+    pub fn scaled(self, by: f64) -> Self {
+        match self {
+            Self::Strips(strips) => Self::Strips(((strips as f64 * by).round() as usize).max(1)),
+            Self::Length(length) => Self::Length(length * by),
+        }
+    }
+}
+
 /// Faces with the belt of each.
 #[derive(Clone, Debug)]
 pub(super) struct Belts {

@@ -9,7 +9,7 @@ use super::ground::Ground;
 use crate::mesh::id::Vertex;
 use crate::mesh::{FaceId, IdVec, VertexId};
 
-/// Dijkstra's algorithm. Of equally long paths the one over the lowest vertices is found.
+/// Dijkstra's algorithm, towards a goal where one is given (A*). Of equally long paths the one over the lowest vertices is found.
 #[derive(Clone, Debug, Default)]
 pub struct Finder {
     length: IdVec<Vertex, f64>,
@@ -29,6 +29,9 @@ pub struct Terrain<'t> {
     pub cost: &'t dyn Fn(DVec3, DVec3) -> f64,
     /// Paths that cost more are not found.
     pub limit: f64,
+    /// Where the only target lies, if it is known: the search then looks there first. No edge may cost less than its
+    /// length.
+    pub goal: Option<DVec3>,
 }
 
 impl Finder {
@@ -53,14 +56,16 @@ impl Finder {
         self.round += 1;
         let (open, settled) = (2 * self.round, 2 * self.round + 1);
         let mut queue = BinaryHeap::new();
+        // What is left of the way costs at least its straight length.
+        let rest = |v: VertexId| terrain.goal.map_or(0.0, |goal| ground.point(v).distance(goal));
         for &source in sources {
             (self.length[source], self.from[source], self.seen[source]) = (0.0, source, open);
-            queue.push(Reverse((0_u64, source.raw())));
+            queue.push(Reverse((rest(source).to_bits(), source.raw())));
         }
-        while let Some(Reverse((bits, raw))) = queue.pop() {
+        while let Some(Reverse((_, raw))) = queue.pop() {
             let at = VertexId::from_raw(raw);
-            // Lengths are not negative, so their bits are ordered as they are.
-            if self.seen[at] == settled || bits != self.length[at].to_bits() {
+            // Of several entries of a vertex the first one to come has its least length.
+            if self.seen[at] == settled {
                 continue;
             }
             self.seen[at] = settled;
@@ -74,13 +79,15 @@ impl Finder {
                 if self.seen[next] == settled || !(terrain.open)(left, right) {
                     continue;
                 }
-                if !(terrain.free)(next) && !is_target(next) {
+                let is_new = self.seen[next] != open;
+                if is_new && !(terrain.free)(next) && !is_target(next) {
                     continue;
                 }
                 let length = self.length[at] + (terrain.cost)(ground.point(at), ground.point(next));
-                if length <= terrain.limit && (self.seen[next] != open || length < self.length[next]) {
+                if length <= terrain.limit && (is_new || length < self.length[next]) {
                     (self.length[next], self.from[next], self.seen[next]) = (length, at, open);
-                    queue.push(Reverse((length.to_bits(), next.raw())));
+                    // Neither is negative, so that the bits of sums are ordered as they are.
+                    queue.push(Reverse(((length + rest(next)).to_bits(), next.raw())));
                 }
             }
         }

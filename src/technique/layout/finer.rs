@@ -39,25 +39,26 @@ impl Room {
         origins
     }
 
-    /// Cuts these faces in four, in rising order; whether that may help.
+    /// Cuts these faces in four, in rising order; for each face now the one before that it is a part of. `None` where
+    /// that does not help.
     ///
     /// # Errors
     /// The run was interrupted.
-    pub fn cut(&mut self, faces: Vec<FaceId>) -> Result<bool, Cancelled> {
+    pub fn cut(&mut self, faces: Vec<FaceId>) -> Result<Option<IdVec<Face, FaceId>>, Cancelled> {
         /// What is still too coarse after so many rounds will remain so.
-        const ROUNDS: usize = 5;
+        const ROUNDS: usize = 24;
         if self.cuts.len() >= ROUNDS {
-            return Ok(false);
+            return Ok(None);
         }
         match quarter(&self.surface, &faces, self.most) {
             Ok((surface, parents)) if surface.faces.len() > self.surface.faces.len() => {
                 self.parents = parents.iter().map(|&f| self.parents[f]).collect();
                 self.surface = surface;
                 self.cuts.push(faces);
-                Ok(true)
+                Ok(Some(parents))
             }
             Err(RefineError::Cancelled(cancelled)) => Err(cancelled),
-            Ok(_) | Err(_) => Ok(false),
+            Ok(_) | Err(_) => Ok(None),
         }
     }
 }

@@ -32,6 +32,8 @@ pub struct Ground<'a> {
     pub domain: IdVec<Face, u32>,
     /// How many domains there are.
     pub domains: usize,
+    /// Twice the area of each face along its normal.
+    pub areas: IdVec<Face, DVec3>,
 }
 
 impl<'a> Ground<'a> {
@@ -56,7 +58,9 @@ impl<'a> Ground<'a> {
         let faces_at = VertexFaces::new(surface);
         let differ = |v: VertexId| faces_at.of(v).iter().any(|&f| domain[f] != domain[faces_at.of(v)[0]]);
         let on_border = surface.points.ids().map(|v| on_rim[v] || differ(v)).collect();
-        Self { surface, across, faces_at, on_rim, on_border, domain, domains }
+        let area = |f| crate::mesh::geometry::area_vector(surface.corners(f));
+        let areas = surface.faces.ids().map(area).collect();
+        Self { surface, across, faces_at, on_rim, on_border, domain, domains, areas }
     }
 
     /// The coordinates of a vertex.

@@ -11,6 +11,7 @@
 //! # Cost
 //! A change is O(n log n) in the faces of the cells that it touches.
 
+pub mod complex;
 pub mod couple;
 pub mod export;
 pub mod finder;
@@ -28,6 +29,7 @@ mod room;
 use glam::DVec3;
 use rustc_hash::FxHashMap;
 
+pub use complex::Complex;
 pub use export::to_quads;
 pub use finder::{Finder, Terrain, along};
 pub use finer::{Room, cut_again, with_rings};
@@ -35,7 +37,6 @@ pub use ground::{Ground, Side, components};
 pub use pattern::Pattern;
 pub use replace::Undo;
 
-use crate::mesh::geometry::area_vector;
 use crate::mesh::id::{Face, Vertex};
 use crate::mesh::{FaceId, IdVec, VertexId};
 
@@ -63,8 +64,8 @@ pub struct Layout<'g> {
     /// Nodes that stay where they are: corners, and where borders of domains meet.
     pub fixed: IdVec<Vertex, bool>,
     around: FxHashMap<VertexId, Vec<u32>>,
-    /// How many patches of a domain each fixed node should have.
-    corners: FxHashMap<(VertexId, u32), usize>,
+    /// The angle of each domain at fixed nodes, in right angles.
+    corners: FxHashMap<(VertexId, u32), f64>,
     pub(crate) finder: Finder,
 }
 
@@ -183,7 +184,7 @@ impl<'g> Layout<'g> {
 
     /// The area of a cell along its mean normal.
     pub fn area(&self, cell: u32) -> DVec3 {
-        self.faces(cell).iter().map(|&f| area_vector(self.ground.surface.corners(f))).sum::<DVec3>() / 2.0
+        self.faces(cell).iter().map(|&f| self.ground.areas[f]).sum::<DVec3>() / 2.0
     }
 
     /// The least sine-like quality of the corners that these nodes make on a patch of this normal: 1 for a rectangle

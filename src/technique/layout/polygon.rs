@@ -164,6 +164,17 @@ impl Layout<'_> {
                 return Some(undo.made);
             }
         }
-        None
+        self.open_digon(cell)
+    }
+
+    /// A domain of one cell with two corners gets a node on its border, which those beyond get too.
+    fn open_digon(&mut self, cell: u32) -> Option<Vec<u32>> {
+        let longest =
+            (0..2).filter(|&k| self.neighbour(cell, k).is_none()).max_by_key(|&k| self.path(cell, k).len())?;
+        let path = self.path(cell, longest);
+        let middle = *path.get(path.len() / 2).filter(|_| path.len() > 2)?;
+        let other = self.beyond(cell, longest);
+        self.make_node(middle, [Some(cell), other]);
+        Some(other.into_iter().chain([cell]).collect())
     }
 }

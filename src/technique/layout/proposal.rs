@@ -1,6 +1,7 @@
 //! A proposal to fill some cells anew, said by nodes; its cost before and after, and its execution.
 
 use std::collections::BTreeMap;
+use std::f64::consts::FRAC_PI_2;
 
 use glam::DVec3;
 use rustc_hash::FxHashMap;
@@ -14,7 +15,7 @@ use crate::mesh::id::Vertex;
 use crate::mesh::{IdVec, VertexId};
 
 /// What a triangle costs; an inner node with one patch too many costs 1.
-const TRIANGLE: f64 = 6.0;
+pub(super) const TRIANGLE: f64 = 6.0;
 /// What a node on a smooth border costs more than an inner one, because regular borders matter most.
 const BORDER: f64 = 1.5;
 
@@ -22,6 +23,9 @@ const BORDER: f64 = 1.5;
 pub(super) fn new_node(number: usize) -> VertexId {
     VertexId::from_raw(u32::MAX - 1 - number as u32)
 }
+
+/// A border that turns by more between straight edges, in right angles, has a corner there.
+const COARSE: f64 = 2.0 / 3.0;
 
 fn is_new(v: VertexId) -> bool {
     v.raw() > u32::MAX / 2
@@ -36,8 +40,8 @@ pub struct Proposal {
     pub faces: Vec<Vec<VertexId>>,
 }
 
-/// How many patches each domain should have at these nodes: one for each right angle.
-pub(super) fn corners(ground: &Ground<'_>, fixed: &IdVec<Vertex, bool>) -> FxHashMap<(VertexId, u32), usize> {
+/// The angle of each domain at these nodes, in right angles.
+pub(super) fn corners(ground: &Ground<'_>, fixed: &IdVec<Vertex, bool>) -> FxHashMap<(VertexId, u32), f64> {
     let mut angles: FxHashMap<(VertexId, u32), f64> = FxHashMap::default();
     for v in fixed.ids().filter(|&v| fixed[v]) {
         for &f in ground.faces_at.of(v) {
@@ -46,21 +50,53 @@ pub(super) fn corners(ground: &Ground<'_>, fixed: &IdVec<Vertex, bool>) -> FxHas
             *angles.entry((v, ground.domain[f])).or_default() += angle;
         }
     }
-    let right_angles = |total: f64| ((total / std::f64::consts::FRAC_PI_2).round() as usize).max(1);
-    angles.into_iter().map(|(at, total)| (at, right_angles(total))).collect()
+    angles.into_iter().map(|(at, total)| (at, total / FRAC_PI_2)).collect()
 }
 
 impl Layout<'_> {
     /// How many patches of its domain a node should have: 4 inside, 2 on a smooth border, at a corner one for each
-    /// right angle.
+    /// right angle. On a border that is coarse beside its curve, as round a small hole, either number will do.
     pub fn wanted(&self, node: VertexId, domain: u32) -> usize {
         if !self.is_on_border(node) {
             return 4;
         }
-        if !self.fixed[node] {
+        if self.fixed[node] {
+            return (self.right_angles(node, domain).round() as usize).max(1);
+        }
+        if self.patches(node, domain) <= 2 {
             return 2;
         }
-        self.corners.get(&(node, domain)).copied().unwrap_or(1)
+        let coarse = self.coarse_angles(node, domain);
+        if (coarse - 2.0).abs() <= COARSE { 2 } else { coarse.round().max(2.0) as usize }
+    }
+
+    /// At a corner whose angle lies between two numbers of right ones, the one that it is farther from.
+    pub(super) fn second_choice(&self, node: VertexId, domain: u32) -> Option<usize> {
+        /// How near to the middle between both.
+        const BETWEEN: f64 = 0.2;
+        let angle = self.corners.get(&(node, domain)).copied().filter(|_| self.fixed[node])?;
+        let is_between = (angle - angle.floor() - 0.5).abs() < BETWEEN && angle > 1.0;
+        let first = angle.round();
+        is_between.then(|| if first > angle { first as usize - 1 } else { first as usize + 1 })
+    }
+
+    /// The angle of a domain at a fixed node, in right angles.
+    fn right_angles(&self, node: VertexId, domain: u32) -> f64 {
+        self.corners.get(&(node, domain)).copied().unwrap_or(1.0)
+    }
+
+    /// The angle of a domain at a node of its border between the straight edges there, in right angles.
+    fn coarse_angles(&self, node: VertexId, domain: u32) -> f64 {
+        let at = self.ground.point(node);
+        let angle = |&cell: &u32| {
+            let ring = self.ring(cell);
+            let n = ring.len();
+            let k = ring.iter().position(|corner| corner.node == node).unwrap_or(0);
+            let [to, from] = [1, n - 1].map(|step| self.ground.point(ring[(k + step) % n].node) - at);
+            crate::mesh::geometry::angle(to, from)
+        };
+        let here = self.cells_at(node).iter().filter(|&&c| self.domain(c) == domain);
+        here.map(angle).sum::<f64>() / FRAC_PI_2
     }
 
     /// How many cells of a domain a node has.
@@ -70,11 +106,32 @@ impl Layout<'_> {
 
     /// What a node with so many patches costs.
     pub(super) fn strain(&self, node: VertexId, domain: u32, patches: usize) -> f64 {
-        let off = patches.abs_diff(self.wanted(node, domain)) as f64;
+        let off = self.off(node, domain, patches);
         let weight = if self.is_on_border(node) { BORDER } else { 1.0 };
         // An inner node of two patches is no corner of either.
         let folded = if patches == 2 && !self.is_on_border(node) { 4.0 } else { 0.0 };
         weight * off * off + folded
+    }
+
+    /// How far so many patches are from what fits a node. An angle between two numbers of right ones takes either.
+    pub(super) fn off(&self, node: VertexId, domain: u32, patches: usize) -> f64 {
+        if !self.is_on_border(node) {
+            return patches.abs_diff(4) as f64;
+        }
+        if self.fixed[node] {
+            let off = (patches as f64 - self.right_angles(node, domain)).abs();
+            return (2.0 * off - 1.0).max(0.0);
+        }
+        let smooth = patches.abs_diff(2) as f64;
+        if patches <= 2 {
+            return smooth;
+        }
+        let coarse = self.coarse_angles(node, domain);
+        if (coarse - 2.0).abs() <= COARSE {
+            smooth
+        } else {
+            (patches as f64 - coarse.round().max(2.0)).abs().min(smooth)
+        }
     }
 
     /// The rim of some cells as nodes, counter-clockwise; `None` unless they form a disk.

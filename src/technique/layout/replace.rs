@@ -197,7 +197,8 @@ impl Layout<'_> {
         let free = |v: VertexId| self.is_inside(v, cell) && !taken.contains(&v);
         let open = |left: FaceId, right: FaceId| self.cell[left] == cell && self.cell[right] == cell;
         let cost = along(self.ground.point(from), self.ground.point(to));
-        let terrain = Terrain { free: &free, open: &open, cost: &cost, limit: f64::INFINITY };
+        let terrain =
+            Terrain { free: &free, open: &open, cost: &cost, limit: f64::INFINITY, goal: Some(self.ground.point(to)) };
         let path = finder.path(self.ground, &[from], |v| v == to, &terrain);
         self.finder = finder;
         path

@@ -23,7 +23,7 @@ impl Layout<'_> {
         let (a, b) = (self.ground.point(from), self.ground.point(to));
         let cost = along(a, b);
         let limit = 20.0 * a.distance(b);
-        let terrain = Terrain { free: &usable, open: &open, cost: &cost, limit };
+        let terrain = Terrain { free: &usable, open: &open, cost: &cost, limit, goal: Some(b) };
         let path = finder.path(self.ground, &[from], |v| v == to, &terrain).unwrap_or_default();
         self.finder = finder;
         let mut moved = Vec::new();

@@ -13,7 +13,7 @@ use super::{LEAST, Memory};
 use crate::mesh::VertexId;
 use crate::technique::layout::Layout;
 use crate::technique::layout::lift::Flat;
-use crate::technique::layout::proposal::Proposal;
+use crate::technique::layout::proposal::{Proposal, TRIANGLE};
 use crate::watch::{Cancelled, Watch};
 
 /// Larger cavities change more than they gain.
@@ -52,7 +52,7 @@ fn is_irregular(layout: &Layout<'_>, v: VertexId) -> bool {
     let mut domains: Vec<u32> = layout.cells_at(v).iter().map(|&c| layout.domain(c)).collect();
     domains.sort_unstable();
     domains.dedup();
-    domains.into_iter().any(|d| layout.patches(v, d) != layout.wanted(v, d))
+    domains.into_iter().any(|d| layout.off(v, d, layout.patches(v, d)) > 0.5)
 }
 
 /// The cells of one domain at a node.
@@ -103,6 +103,8 @@ fn grow(layout: &mut Layout<'_>, cells: Vec<u32>, memory: &mut Memory) -> bool {
         if let Some(proposal) = cavity.proposal(layout)
             && layout.gain(&proposal) < LESS
             && !memory.refused.contains(&proposal)
+            && proposal.cells.iter().map(|&c| layout.area(c).length()).sum::<f64>()
+                <= memory.largest * proposal.faces.len() as f64
         {
             tries += 1;
             if layout.carry_out(&proposal, LEAST).is_some() {
@@ -118,13 +120,36 @@ fn grow(layout: &mut Layout<'_>, cells: Vec<u32>, memory: &mut Memory) -> bool {
     false
 }
 
+/// A node of a cavity. The layout stays as it is while the cavity grows.
+#[derive(Clone, Debug)]
+struct Seen {
+    /// Cells inside.
+    inside: i32,
+    /// Cells of the domain, how many there should be, and how many else there may be.
+    patches: i32,
+    wanted: i32,
+    second: Option<i32>,
+    is_border: bool,
+    cells: Vec<u32>,
+}
+
+impl Seen {
+    /// How many patches inside a node of the rim should have; `None` inside. A corner that leans gets its second choice.
+    fn turn(&self, leans: bool) -> Option<i32> {
+        let outside = self.patches - self.inside;
+        let wanted = self.second.filter(|_| leans).unwrap_or(self.wanted);
+        (outside > 0 || self.is_border).then_some(wanted - outside)
+    }
+}
+
 /// Cells that form a disk, while it grows.
 struct Cavity {
     domain: u32,
     cells: Vec<u32>,
     is_inside: FxHashSet<u32>,
-    /// How many cells inside each node has.
-    nodes: BTreeMap<VertexId, usize>,
+    nodes: BTreeMap<VertexId, Seen>,
+    /// What its triangles and nodes cost.
+    cost: f64,
     /// Cells beside the cavity, with the number of common edges.
     beside: BTreeMap<u32, i32>,
 }
@@ -134,7 +159,7 @@ impl Cavity {
         layout.rim(&cells)?;
         let domain = layout.domain(*cells.first()?);
         let (is_inside, nodes, beside) = (FxHashSet::default(), BTreeMap::new(), BTreeMap::new());
-        let mut cavity = Self { domain, cells: Vec::new(), is_inside, nodes, beside };
+        let mut cavity = Self { domain, cells: Vec::new(), is_inside, nodes, cost: 0.0, beside };
         for cell in cells {
             cavity.add(layout, cell);
         }
@@ -145,43 +170,64 @@ impl Cavity {
         self.cells.push(cell);
         self.is_inside.insert(cell);
         self.beside.remove(&cell);
+        self.cost += if layout.ring(cell).len() == 3 { TRIANGLE } else { 0.0 };
         for k in 0..layout.ring(cell).len() {
-            *self.nodes.entry(layout.ring(cell)[k].node).or_default() += 1;
+            let node = layout.ring(cell)[k].node;
+            let seen = self.nodes.entry(node).or_insert_with(|| {
+                let patches = layout.patches(node, self.domain);
+                self.cost += layout.strain(node, self.domain, patches);
+                Seen {
+                    inside: 0,
+                    patches: patches as i32,
+                    wanted: layout.wanted(node, self.domain) as i32,
+                    second: layout.second_choice(node, self.domain).map(|n| n as i32),
+                    is_border: layout.is_on_border(node),
+                    cells: layout.cells_at(node).to_vec(),
+                }
+            });
+            seen.inside += 1;
             if let Some(other) = layout.neighbour(cell, k).filter(|other| !self.is_inside.contains(other)) {
                 *self.beside.entry(other).or_default() += 1;
             }
         }
     }
 
-    /// How many patches inside a node of the rim should have; `None` inside.
-    fn turn(&self, layout: &Layout<'_>, node: VertexId, inside: usize) -> Option<i32> {
-        let outside = layout.patches(node, self.domain) as i32 - inside as i32;
-        let is_rim = outside > 0 || layout.is_on_border(node);
-        is_rim.then(|| layout.wanted(node, self.domain) as i32 - outside)
+    /// The filling that costs least, if one costs less than what is there.
+    fn proposal(&self, layout: &Layout<'_>) -> Option<Proposal> {
+        /// Corners between two numbers that are tried with the other one.
+        const LEANING: usize = 3;
+        let between = self.nodes.iter().filter(|(_, seen)| seen.second.is_some() && seen.turn(false).is_some());
+        let leans = std::iter::once(None).chain(between.map(|(&v, _)| Some(v)).take(LEANING));
+        let found = leans.filter_map(|lean| self.leaning(layout, lean)).map(|p| (layout.gain(&p), p));
+        found.min_by(|a, b| a.0.total_cmp(&b.0)).map(|best| best.1)
     }
 
-    /// A filling that may cost less than what is there.
-    fn proposal(&self, layout: &Layout<'_>) -> Option<Proposal> {
-        let mut cost = 6.0 * self.cells.iter().filter(|&&c| layout.ring(c).len() == 3).count() as f64;
-        let mut corners = 0;
-        for (&node, &inside) in &self.nodes {
-            let turn = self.turn(layout, node, inside);
-            if turn.is_some_and(|turn| turn > 2) {
-                return None;
+    /// A filling that may cost less than what is there, with the second choice of one corner.
+    fn leaning(&self, layout: &Layout<'_>, lean: Option<VertexId>) -> Option<Proposal> {
+        /// Nodes that turn back which one row can join.
+        const MOST: usize = 2;
+        let turn = |node: VertexId| self.nodes.get(&node).and_then(|seen| seen.turn(lean == Some(node)));
+        let (mut corners, mut reflex) = (0, 0);
+        for (&node, seen) in &self.nodes {
+            match seen.turn(lean == Some(node)) {
+                Some(1) => corners += 1,
+                Some(3) => reflex += 1,
+                Some(2) | None => {}
+                Some(_) => return None,
             }
-            corners += usize::from(turn.is_some_and(|turn| turn < 2));
-            cost += layout.strain(node, self.domain, layout.patches(node, self.domain));
         }
-        if !(2..=6).contains(&corners) {
+        let least = corners as f64 - reflex as f64 - 4.0;
+        if reflex > MOST || !(2 + reflex..=6 + reflex).contains(&corners) || self.cost <= least.abs() {
             return None;
         }
         let rim = layout.rim(&self.cells)?;
-        let is_corner = |k: &usize| self.turn(layout, rim[*k], self.nodes[&rim[*k]]).is_some_and(|turn| turn < 2);
-        let corners: Vec<usize> = (0..rim.len()).filter(is_corner).collect();
-        let outline = Outline { nodes: rim, corners };
-        let least = outline.corners.len().abs_diff(4) as f64;
-        let faces = (cost > least).then(|| outline.whole(&mut 0)).flatten();
-        let faces = faces.or_else(|| (cost > 2.0).then(|| self.in_two(layout, &outline)).flatten())?;
+        let places = |wanted: i32| (0..rim.len()).filter(|&k| turn(rim[k]) == Some(wanted)).collect::<Vec<_>>();
+        let (corners, reflex) = (places(1), places(3));
+        let is_straight = reflex.is_empty();
+        let outline = Outline { nodes: rim, corners, reflex };
+        let whole = if is_straight { outline.whole(&mut 0) } else { None };
+        let faces =
+            whole.or_else(|| (self.cost > 2.0 || !is_straight).then(|| self.in_two(layout, &outline)).flatten())?;
         // What is regular only because it is coarse follows no shape.
         let is_coarse = 3 * faces.len() < self.cells.len();
         (!is_coarse).then(|| Proposal { cells: self.cells.clone(), faces })
@@ -201,9 +247,10 @@ impl Cavity {
             |a: VertexId, b: VertexId| ((point(a).distance(point(b)) / mean).round() as usize).clamp(1, LARGEST);
         let mut cuts = outline.cuts(|a, b| [aimed(a, b).saturating_sub(SLACK), aimed(a, b) + SLACK]);
         let off = |cut: &Cut| aimed(nodes[cut.from], nodes[cut.to]).abs_diff(cut.edges);
-        cuts.sort_by_key(|cut| (off(cut), cut.from, cut.to));
+        cuts.sort_by_key(|cut| (cut.irregular, off(cut), cut.from, cut.to));
         // Of many equally good ones some from everywhere.
-        let equal = cuts.iter().take_while(|cut| off(cut) == cuts.first().map_or(0, off)).count();
+        let first = cuts.first().map(|cut| (cut.irregular, off(cut)));
+        let equal = cuts.iter().take_while(|cut| Some((cut.irregular, off(cut))) == first).count();
         let step = equal.div_ceil(LOOKS).max(1);
         let flat = Flat::new(layout, &self.cells, nodes);
         let judged = cuts.into_iter().step_by(step).take(LOOKS).filter_map(|cut| {
@@ -213,17 +260,17 @@ impl Cavity {
         judged.min_by(|a, b| a.0.total_cmp(&b.0)).map(|best| best.1)
     }
 
-    /// The neighbour that makes the cavity roundest and keeps it a disk: at a node that turns back first, then the one
-    /// with most common edges.
+    /// The neighbour that makes the cavity roundest and keeps it a disk: at a node that no filling can
+    /// have on its rim first, then the one with most common edges.
     fn next_cell(&self, layout: &Layout<'_>) -> Option<u32> {
         /// Neighbours tried.
         const CHOICES: usize = 8;
         let mut scores: BTreeMap<u32, i32> = self.beside.iter().map(|(&c, &common)| (c, 10 * common)).collect();
-        for (&node, &inside) in &self.nodes {
-            let Some(turn) = self.turn(layout, node, inside) else { continue };
-            for cell in layout.cells_at(node) {
+        for seen in self.nodes.values() {
+            let Some(turn) = seen.turn(false) else { continue };
+            for cell in &seen.cells {
                 if let Some(score) = scores.get_mut(cell) {
-                    *score += if turn >= 3 { 25 } else { 1 };
+                    *score += if (1..=2).contains(&turn) { 1 } else { 25 };
                 }
             }
         }

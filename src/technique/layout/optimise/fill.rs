@@ -2,7 +2,8 @@
 //!
 //! A loop of four sides takes a grid, one of three or five sides a grid at each corner, all round one node. Where the
 //! lengths of the sides forbid that, or where there are two or six corners, a straight row cuts the loop in two that
-//! each take such a patch: a node of three and one of five quads make up for sides that differ.
+//! each take such a patch: a node of three and one of five quads make up for sides that differ. Where a loop turns back,
+//! as round the corner of a hole, the row begins there.
 
 use crate::mesh::VertexId;
 use crate::technique::layout::proposal::new_node;
@@ -10,11 +11,13 @@ use crate::technique::layout::proposal::new_node;
 /// Polygons, said by nodes.
 pub(super) type Faces = Vec<Vec<VertexId>>;
 
-/// A loop of nodes, counter-clockwise, with the places of its corners in rising order.
+/// A loop of nodes, counter-clockwise, with the places of its corners in rising order, and of the nodes where it turns
+/// back by a right angle.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Outline {
     pub(super) nodes: Vec<VertexId>,
     pub(super) corners: Vec<usize>,
+    pub(super) reflex: Vec<usize>,
 }
 
 /// A straight row across a loop: between which places, and of how many edges.
@@ -23,6 +26,10 @@ pub(super) struct Cut {
     pub(super) from: usize,
     pub(super) to: usize,
     pub(super) edges: usize,
+    /// Whether the end at `from` is a corner of the part ahead of it and of the other one, then those at `to`.
+    is_corner: [[bool; 2]; 2],
+    /// Parts that have an irregular node.
+    pub(super) irregular: usize,
 }
 
 impl Outline {
@@ -49,66 +56,84 @@ impl Outline {
         }
     }
 
-    /// The rows that leave a regular patch on both sides, among those as long as `lengths` tells for their ends.
+    /// The rows that leave a regular patch on both sides, among those as long as `lengths` tells for their ends. Every
+    /// node where the loop turns back is an end.
     pub(super) fn cuts(&self, lengths: impl Fn(VertexId, VertexId) -> [usize; 2]) -> Vec<Cut> {
-        // How many corners the row leaves on one side; each part gets two more from the row's ends.
-        let beside: &[usize] = match self.corners.len() {
-            2 => &[1],
-            4 => &[1, 3],
-            6 => &[3],
-            _ => return Vec::new(),
-        };
-        let inner: Vec<usize> = (0..self.nodes.len()).filter(|k| self.corners.binary_search(k).is_err()).collect();
+        let is_end = |k: &usize| self.corners.binary_search(k).is_err();
+        let inner: Vec<usize> = (0..self.nodes.len()).filter(is_end).collect();
         let mut all = Vec::new();
         for (i, &from) in inner.iter().enumerate() {
             for &to in &inner[i + 1..] {
-                let between = self.corners.iter().filter(|&&c| from < c && c < to).count();
-                if !beside.contains(&between) {
+                if !self.reflex.iter().all(|&k| k == from || k == to) {
                     continue;
                 }
                 let [least, most] = lengths(self.nodes[from], self.nodes[to]);
                 for edges in least.max(1)..=most {
-                    let cut = Cut { from, to, edges };
-                    if [[from, to], [to, from]].iter().all(|&ends| spokes(&self.sides_beside(ends, edges)).is_some()) {
-                        all.push(cut);
-                    }
+                    self.ends(from).iter().for_each(|&a| {
+                        let cuts = self.ends(to).iter().map(|&b| [a, b]);
+                        all.extend(cuts.filter_map(|is_corner| self.cut(from, to, edges, is_corner)));
+                    });
                 }
             }
         }
         all
     }
 
-    /// The sides of the part between two places and a row of so many edges back.
-    fn sides_beside(&self, [first, last]: [usize; 2], edges: usize) -> Vec<usize> {
+    /// Of which parts beside a row its end may be a corner.
+    fn ends(&self, place: usize) -> &'static [[bool; 2]] {
+        if self.reflex.contains(&place) { &[[true, false], [false, true]] } else { &[[true, true]] }
+    }
+
+    /// A row, if both parts beside it take regular patches.
+    fn cut(&self, from: usize, to: usize, edges: usize, is_corner: [[bool; 2]; 2]) -> Option<Cut> {
+        let mut cut = Cut { from, to, edges, is_corner, irregular: 0 };
+        for (first, last, back) in [(from, to, false), (to, from, true)] {
+            // Of the loop's own corners those between both places.
+            let between = self.corners.iter().filter(|&&c| (from < c && c < to) != back).count();
+            let [at_from, at_to] = is_corner.map(|ends| usize::from(ends[usize::from(back)]));
+            let corners = between + at_from + at_to;
+            if !(3..=5).contains(&corners) || !fits(&self.sides_beside([first, last], edges, cut, back)) {
+                return None;
+            }
+            cut.irregular += usize::from(corners != 4);
+        }
+        Some(cut)
+    }
+
+    /// The places of the corners of the part from one end of a row to the other, counted from there.
+    fn corners_beside(&self, [first, last]: [usize; 2], cut: Cut, is_back: bool) -> (Vec<usize>, usize) {
         let all = self.nodes.len();
         let steps = (last + all - first) % all;
-        let mut ends: Vec<usize> =
+        let mut corners: Vec<usize> =
             self.corners.iter().map(|&c| (c + all - first) % all).filter(|&c| c < steps).collect();
-        ends.push(steps);
-        ends.sort_unstable();
-        let mut sides = vec![ends[0]];
-        sides.extend(ends.windows(2).map(|w| w[1] - w[0]));
-        sides.push(edges);
-        sides
+        let [at_from, at_to] = cut.is_corner.map(|ends| ends[usize::from(is_back)]);
+        let [at_first, at_last] = if is_back { [at_to, at_from] } else { [at_from, at_to] };
+        corners.extend(at_first.then_some(0));
+        corners.extend(at_last.then_some(steps));
+        corners.sort_unstable();
+        (corners, steps)
+    }
+
+    /// The sides of the part between two places and a row of so many edges back.
+    fn sides_beside(&self, ends: [usize; 2], edges: usize, cut: Cut, is_back: bool) -> Vec<usize> {
+        let (corners, steps) = self.corners_beside(ends, cut, is_back);
+        let (n, all) = (corners.len(), steps + edges);
+        (0..n).map(|i| (corners[(i + 1) % n] + all - 1 - corners[i]) % all + 1).collect()
     }
 
     /// The loops on both sides of a row.
     fn parts(&self, cut: Cut, fresh: &mut usize) -> [Self; 2] {
-        let Cut { from, to, edges } = cut;
+        let Cut { from, to, edges, .. } = cut;
         let row: Vec<VertexId> = (*fresh..*fresh + edges - 1).map(new_node).collect();
         *fresh += edges - 1;
         let all = self.nodes.len();
-        let part = |first: usize, last: usize, back: &mut dyn Iterator<Item = VertexId>| {
-            let steps = (last + all - first) % all;
+        let part = |first: usize, last: usize, is_back: bool, back: &mut dyn Iterator<Item = VertexId>| {
+            let (corners, steps) = self.corners_beside([first, last], cut, is_back);
             let mut nodes: Vec<VertexId> = (0..=steps).map(|k| self.nodes[(first + k) % all]).collect();
-            let mut corners: Vec<usize> = self.corners.iter().map(|&c| (c + all - first) % all).collect();
-            corners.retain(|&c| c < steps);
-            corners.extend([0, steps]);
-            corners.sort_unstable();
             nodes.extend(back);
-            Self { nodes, corners }
+            Self { nodes, corners, reflex: Vec::new() }
         };
-        [part(from, to, &mut row.iter().rev().copied()), part(to, from, &mut row.iter().copied())]
+        [part(from, to, false, &mut row.iter().rev().copied()), part(to, from, true, &mut row.iter().copied())]
     }
 
     /// Two regular patches beside a row.
@@ -118,6 +143,14 @@ impl Outline {
         let mut faces = one.whole(&mut fresh)?;
         faces.extend(other.whole(&mut fresh)?);
         Some(faces)
+    }
+}
+
+/// Whether a loop of these sides takes a regular patch.
+fn fits(sides: &[usize]) -> bool {
+    match sides {
+        [a, b, c, d] => a == c && b == d,
+        _ => spokes(sides).is_some(),
     }
 }
 
@@ -212,7 +245,7 @@ mod tests {
         for side in &sides[..sides.len() - 1] {
             corners.push(corners[corners.len() - 1] + side);
         }
-        Outline { nodes: (0..total).map(VertexId::new).collect(), corners }
+        Outline { nodes: (0..total).map(VertexId::new).collect(), corners, reflex: Vec::new() }
     }
 
     /// Checks that nodes on the rim have one quad at corners and two elsewhere; how many quads irregular ones have.
@@ -242,6 +275,17 @@ mod tests {
             assert_eq!(irregular(&outline, &faces), centre, "{sides:?}");
         }
         assert_eq!(outline(&[2, 1, 1, 2]).whole(&mut 0), None, "opposite sides differ");
+    }
+
+    #[test]
+    fn a_row_from_where_a_loop_turns_back_leaves_nothing_irregular() {
+        // An L of 4 by 4 less 2 by 2, its reflex corner eighth.
+        let nodes: Vec<VertexId> = (0..16).map(VertexId::new).collect();
+        let outline = Outline { nodes, corners: vec![0, 4, 6, 10, 12], reflex: vec![8] };
+        let best = outline.cuts(|_, _| [1, 8]).into_iter().min_by_key(|cut| cut.irregular).expect("a row");
+        assert_eq!((best.irregular, best.edges), (0, 2));
+        let faces = outline.in_two(best).expect("two patches");
+        assert_eq!((faces.len(), faces.iter().all(|f| f.len() == 4)), (12, true));
     }
 
     #[test]

@@ -42,12 +42,17 @@ struct Memory {
     refused: FxHashSet<Proposal>,
     /// Faces of cavities that may still be filled in vain, so that there is an end on shapes that refuse.
     patience: usize,
+    /// New cells may be so large on average; square of the mesh's unit.
+    largest: f64,
     /// Nodes with the cells round them when they were last moved to their middle.
     relaxed: FxHashMap<VertexId, Vec<u32>>,
 }
 
 /// So many times all faces of the surface may be filled in vain.
 const PATIENCE: usize = 12;
+
+/// How many times as large as the first ones the cells of a cavity filled anew may be: what is coarser follows no shape.
+const LARGEST: f64 = 2.5;
 
 /// New cells of less quality are refused, unless the old ones were worse.
 const LEAST: f64 = 0.03;
@@ -58,8 +63,8 @@ const LEAST: f64 = 0.03;
 /// # Errors
 /// The run was interrupted.
 pub fn polygonise(layout: &mut Layout<'_>, watch: &Watch) -> Result<Vec<u32>, Cancelled> {
-    /// What three rounds do not free is too narrow.
-    const ROUNDS: usize = 3;
+    /// What a round does not free needs a finer mesh.
+    const ROUNDS: usize = 1;
     let mut stuck = layout.make_polygons();
     for _ in 0..ROUNDS {
         if stuck.is_empty() {
@@ -80,7 +85,9 @@ pub fn optimise(layout: &mut Layout<'_>, watch: &Watch) -> Result<OptimiseReport
     const ROUNDS: usize = 10;
     let mut report = OptimiseReport::default();
     let patience = PATIENCE * layout.ground.surface.faces.len();
-    let memory = &mut Memory { patience, ..Memory::default() };
+    let cells: Vec<f64> = layout.cells().map(|c| layout.area(c).length()).collect();
+    let largest = LARGEST * cells.iter().sum::<f64>() / cells.len().max(1) as f64;
+    let memory = &mut Memory { patience, largest, ..Memory::default() };
     layout.relax(1, memory, watch)?;
     for _ in 0..ROUNDS {
         let before = report;
