@@ -3,10 +3,11 @@
 //! The common curves come first, least squares over the path with both ends fixed, so that neighbours share them; then
 //! the control points inside, least squares over the covered vertices with a thin-plate term, whose parameters are then
 //! corrected to the feet of the vertices and the fit repeated. A patch farther from its vertices than the tolerance gets
-//! twice the spans, where that helps. Patches meet in common curves; the angle between their tangent planes is measured. On demand smooth
-//! seams get a common plane at each of their points: curves leave their nodes in one plane, and the control points next
-//! to a seam are drawn into the mean of the planes of both patches, by the same least squares. That is tangent
-//! continuity within a tolerance, not to the last digit, which bicubic patches round any node cannot have.
+//! twice the spans, where that helps. Patches meet in common curves, which follow the paths without their zigzag; the
+//! angle between their tangent planes is measured. On demand smooth seams get a common plane at each of their points:
+//! curves leave their nodes in one plane, and the control points next to a seam are drawn into the mean of the planes of
+//! both patches, by the same least squares, as far as the tolerance allows and no patch folds. That is tangent continuity
+//! within a tolerance, not to the last digit, which bicubic patches round any node cannot have.
 //!
 //! Based on: M. Eck, H. Hoppe. Automatic Reconstruction of B-Spline Surfaces of Arbitrary Topological Type. SIGGRAPH,
 //! 1996; J. Hoschek. Intrinsic Parametrization for Approximation. CAGD 5, 1988.
@@ -267,11 +268,11 @@ impl Fit {
             return;
         }
         let fairness = rules.fairness.max(FAIR);
-        let before = (self.patch.clone(), self.samples.places.clone());
+        let (before, folds) = ((self.patch.clone(), self.samples.places.clone()), self.folds());
         for reach in REACH {
             fit_tangent(&mut self.patch, &self.samples, fairness, (&planes, reach * rules.tolerance));
             self.correct();
-            if self.error() <= rules.tolerance {
+            if self.error() <= rules.tolerance && self.folds() <= folds {
                 return;
             }
             (self.patch, self.samples.places) = before.clone();
@@ -303,6 +304,19 @@ impl Fit {
     fn error(&self) -> f64 {
         let pairs = self.samples.points.iter().zip(&self.samples.places);
         pairs.map(|(&p, &[u, v])| self.patch.point(u, v).distance(p)).fold(0.0, f64::max)
+    }
+
+    /// At how many places of a grid the patch looks away from where it looks as a whole.
+    fn folds(&self) -> usize {
+        const PLACES: usize = 8;
+        let at = |k: usize| (k as f64 + 0.5) / PLACES as f64;
+        let across = |k: usize| {
+            let [_, su, sv] = self.patch.eval(at(k % PLACES), at(k / PLACES));
+            su.cross(sv)
+        };
+        let all: Vec<DVec3> = (0..PLACES * PLACES).map(across).collect();
+        let mean: DVec3 = all.iter().sum();
+        all.iter().filter(|normal| normal.dot(mean) < 0.0).count()
     }
 
     fn correct(&mut self) {

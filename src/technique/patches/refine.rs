@@ -46,7 +46,7 @@ impl Spans {
                 changed = true;
                 continue;
             }
-            if !self.is_settled[e] && self.has_room(e, samples[e], rules) && self.wants(e, *now, rules) {
+            if !self.is_settled[e] && self.has_room(e, samples[e], rules) && Self::wants(*now, rules) {
                 self.tried[e] = Some(*now);
                 self.counts[e] *= 2;
                 changed = true;
@@ -61,9 +61,9 @@ impl Spans {
         2 * spans <= rules.max_spans && (2 * spans + 1) * (2 * spans + 1) <= samples
     }
 
-    /// More spans follow the facets of a coarse mesh more closely, so bends alone ask for two at most.
-    fn wants(&self, e: usize, now: Fault, rules: &FitRules) -> bool {
-        now.error > rules.tolerance || self.counts[e] == 1 && is_bent(now, rules)
+    /// More spans follow the facets of a coarse mesh more closely, so bends ask for none.
+    fn wants(now: Fault, rules: &FitRules) -> bool {
+        now.error > rules.tolerance
     }
 }
 
@@ -71,18 +71,12 @@ fn is_bent(fault: Fault, rules: &FitRules) -> bool {
     rules.smooth.is_some_and(|most| fault.angle > most)
 }
 
-/// Whether a patch that was not good enough is good now, or clearly better.
+/// Whether a patch beyond the tolerance is within it now, or clearly better and not bent for that.
 fn helps(before: Fault, now: Fault, rules: &FitRules) -> bool {
     /// Of what it was.
     const BETTER: f64 = 0.8;
-    let error = now.error <= rules.tolerance.max(BETTER * before.error);
-    let angle = !is_bent(now, rules) || now.angle <= BETTER * before.angle;
-    if before.error > rules.tolerance {
-        // What cost smoothness must have paid by coming within the tolerance.
-        error && (angle || now.error <= rules.tolerance)
-    } else {
-        error && angle
-    }
+    let is_smooth = !is_bent(now, rules) || now.angle <= before.angle;
+    now.error <= rules.tolerance || now.error <= BETTER * before.error && is_smooth
 }
 
 #[cfg(test)]
