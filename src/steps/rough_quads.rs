@@ -169,9 +169,10 @@ pub fn rough_quads(
 ) -> Result<(Quads, RoughQuadsStats), RoughQuadsError> {
     let rules = rules(surface, params)?;
     check_borders(&Ground::new(surface))?;
-    let made = match params.optimize {
-        true => best(surface, &rules, watch)?,
-        false => attempt(surface, &rules, false, &mut Vec::new(), watch)?,
+    let made = if params.optimize {
+        best(surface, &rules, watch)?
+    } else {
+        attempt(surface, &rules, false, &mut Vec::new(), watch)?
     };
     made.map(|made| finish(surface, made)).map_err(|narrow| RoughQuadsError::TooCoarse { faces: narrow.places })
 }
@@ -222,7 +223,7 @@ fn best(surface: &Surface, rules: &BeltRules, watch: &Watch) -> Result<Result<At
     let mut narrow = Narrow { places: Vec::new() };
     for (order, snap, scale) in WAYS {
         let (interval, thickness) = (rules.interval * scale, rules.thickness.scaled(scale));
-        let way = BeltRules { order, snap, interval, thickness, ..*rules };
+        let way = BeltRules { thickness, interval, order, snap, ..*rules };
         match attempt(surface, &way, true, &mut known, watch)? {
             Ok(made) => {
                 let excess = excess(&made.counts, made.quads.mesh.faces.len());
