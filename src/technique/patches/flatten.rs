@@ -57,7 +57,9 @@ fn mean_values(ground: &Ground<'_>, v: VertexId, place: &FxHashMap<VertexId, usi
     let sum: f64 = row.iter().map(|&(_, w)| w).sum();
     let is_sound = sum > 0.0 && sum.is_finite();
     let count = row.len().max(1) as f64;
-    row.iter_mut().for_each(|(_, w)| *w = if is_sound { *w / sum } else { 1.0 / count });
+    for (_, w) in &mut row {
+        *w = if is_sound { *w / sum } else { 1.0 / count };
+    }
     row
 }
 

@@ -206,7 +206,9 @@ fn path_normals(frame: &Frame<'_>, arc: &frame::Arc) -> Vec<(f64, DVec3)> {
         (at, sides.into_iter().flatten().map(|side| ground.normal(side.face)).sum::<DVec3>().normalize_or_zero())
     };
     let mut normals: Vec<(f64, DVec3)> = arc.path.windows(2).map(edge).collect();
-    normals.iter_mut().for_each(|(end, _)| *end /= at.max(f64::MIN_POSITIVE));
+    for (end, _) in &mut normals {
+        *end /= at.max(f64::MIN_POSITIVE);
+    }
     normals
 }
 
@@ -306,10 +308,10 @@ impl Fit {
         pairs.map(|(&p, &[u, v])| self.patch.point(u, v).distance(p)).fold(0.0, f64::max)
     }
 
-    /// At how many places of a grid the patch looks away from where it looks as a whole.
+    /// At how many places of a grid, sides included, the patch looks away from where it looks as a whole.
     fn folds(&self) -> usize {
-        const PLACES: usize = 8;
-        let at = |k: usize| (k as f64 + 0.5) / PLACES as f64;
+        const PLACES: usize = 13;
+        let at = |k: usize| k as f64 / (PLACES - 1) as f64;
         let across = |k: usize| {
             let [_, su, sv] = self.patch.eval(at(k % PLACES), at(k / PLACES));
             su.cross(sv)
