@@ -102,7 +102,7 @@ mod tests {
         let mut spans = Spans::new(2);
         let fault = |error| Fault { error, angle: 90.0 };
         for error in [50.0, 20.0, 8.0, 3.0] {
-            spans.refine(&[fault(error); 2], &[1_000, 30], &RULES);
+            spans.refine(&[fault(error); 2], &[1_000, 20], &RULES);
         }
         assert_eq!(spans.counts(), [8, 2]);
     }
