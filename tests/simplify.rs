@@ -367,3 +367,14 @@ fn a_percent_is_no_squared_length() {
     let input = ControlPropertiesInput { surface: &mesh, reference: &mesh, locks: LockRules::default() };
     assert!(control_properties(input, &params, &Watch::silent()).is_err());
 }
+
+#[test]
+fn a_size_that_asks_for_too_many_faces_is_refused() {
+    let mesh = tetrahedron();
+    let input = ControlPropertiesInput { surface: &mesh, reference: &mesh, locks: LockRules::default() };
+    for size in [0.0, -1.0, 1e-6, f64::NAN] {
+        let params = ControlPropertiesParams { max_size: Some(Length::Absolute(size).into()), ..tolerance(10.0) };
+        let refused = control_properties(input, &params, &Watch::silent()).expect_err("no mesh has so many faces");
+        assert!(refused.to_string().contains("max-size"), "{refused}");
+    }
+}

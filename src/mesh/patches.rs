@@ -14,7 +14,7 @@ pub struct Patch {
     pub controls: Vec<DVec3>,
     /// Whether its side v = 1 is a single point: a patch over a triangle.
     pub is_triangle: bool,
-    /// Largest distance of a vertex that it covers from the patches.
+    /// Largest distance between it and the surface, both ways.
     pub max_error: f64,
     /// Root of the mean square of these distances.
     pub rms_error: f64,

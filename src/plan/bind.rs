@@ -190,10 +190,15 @@ fn check_ranges(table: &Table, schema: &ParameterSchema, context: &mut CaseConte
     for (key, entry) in &table.entries {
         let (Some(number), Some(property)) = (entry.value.as_number(), schema.properties.get(key)) else { continue };
         let bound = |name: &str| property.get(name).and_then(Value::as_f64);
-        let low = bound("minimum").filter(|limit| number < *limit).map(|limit| format!("at least {limit}"));
-        let high = bound("maximum").filter(|limit| number > *limit).map(|limit| format!("at most {limit}"));
-        let above =
-            bound("exclusiveMinimum").filter(|limit| number <= *limit).map(|limit| format!("greater than {limit}"));
+        // What is no number lies in no range.
+        let low = bound("minimum")
+            .filter(|limit| number.is_nan() || number < *limit)
+            .map(|limit| format!("at least {limit}"));
+        let high =
+            bound("maximum").filter(|limit| number.is_nan() || number > *limit).map(|limit| format!("at most {limit}"));
+        let above = bound("exclusiveMinimum")
+            .filter(|limit| number.is_nan() || number <= *limit)
+            .map(|limit| format!("greater than {limit}"));
         let below =
             bound("exclusiveMaximum").filter(|limit| number >= *limit).map(|limit| format!("less than {limit}"));
         if let Some(range) = low.or(high).or(above).or(below) {

@@ -48,8 +48,9 @@ pub struct AdaptCurvatureParams {
     /// How sizes fall with curvature: 1 in proportion, above 1 faster, below 1 later. Default 1.
     #[schemars(range(min = 0.01, max = 100.0))]
     pub gamma: f64,
-    /// Betters the mesh by flips and relaxation, each certified: stretch, size, valence and distance stay within what the
-    /// mesh has without it. Its faces then are no longer those that were recorded. Default false.
+    /// Betters the mesh by flips and relaxation, each certified: stretch, size and valence stay within what the mesh has
+    /// without it, and so does the distance from the finest mesh, which is itself off the reference of its simplification.
+    /// Its faces then are no longer those that were recorded. Default false.
     pub polish: bool,
 }
 

@@ -49,8 +49,9 @@ pub struct AdaptDensityParams {
     /// mesh. With `like` it has no effect.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub base: Option<Resolution>,
-    /// Betters the mesh by flips and relaxation, each certified: stretch, size, valence and distance stay within what the
-    /// mesh has without it. Its faces then are no longer those that were recorded. Default false.
+    /// Betters the mesh by flips and relaxation, each certified: stretch, size and valence stay within what the mesh has
+    /// without it, and so does the distance from the finest mesh, which is itself off the reference of its simplification.
+    /// Its faces then are no longer those that were recorded. Default false.
     pub polish: bool,
 }
 

@@ -42,7 +42,7 @@ use crate::watch::Watch;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default, rename_all = "kebab-case")]
 pub struct FitPatchesParams {
-    /// A patch farther from a vertex that it covers gets more spans. Default 0.2 % of the surface's diagonal.
+    /// A patch farther from the surface, or the surface from it, gets more spans. Default 0.2 % of the surface's diagonal.
     pub tolerance: Length,
     /// Most spans of a patch in each direction. Default 8; 1 is a single Bezier patch.
     #[schemars(range(min = 1, max = 32))]
@@ -78,7 +78,8 @@ pub struct FitPatchesStats {
     pub triangles: usize,
     /// Control points of all patches.
     pub control_points: usize,
-    /// Largest distance of a covered vertex from the patches.
+    /// Largest distance between patches and surface, both ways: of covered vertices from the patches, and of 17 by 17 places
+    /// of each patch from the surface.
     pub max_error: f64,
     /// Root of the mean square of the patches' errors.
     pub rms_error: f64,
@@ -182,7 +183,7 @@ pub struct Step;
 
 impl StepContract for Step {
     const NAME: &'static str = "fit-patches";
-    const REVISION: u32 = 4;
+    const REVISION: u32 = 5;
     const INPUTS: &'static [InputDef] = &[
         InputDef { name: "from", accepts: &[Port::Quads], required: true, doc: "coarse quads with what they cover" },
         InputDef {

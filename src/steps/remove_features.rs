@@ -42,8 +42,9 @@ const LISTED: usize = 500;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct RemoveFeaturesParams {
-    /// Features up to this diameter are removed; of a stepped hole its widest step counts, chamfers do not. Percents
-    /// refer to the diagonal of `from`.
+    /// Features up to this diameter are removed; of a stepped hole its widest step counts, up to three times the hole's
+    /// width, chamfers do not: a hole in the floor of a wider pocket is a feature of its own. Percents refer to the diagonal
+    /// of `from`.
     pub max_diameter: Length,
     /// What is removed: `"through-holes"`, `"blind-holes"`, `"bosses"`. Default: both sorts of holes.
     #[serde(default = "holes")]
@@ -196,7 +197,7 @@ pub struct Step;
 
 impl StepContract for Step {
     const NAME: &'static str = "remove-features";
-    const REVISION: u32 = 7;
+    const REVISION: u32 = 8;
     const INPUTS: &'static [InputDef] = &[InputDef {
         name: "from",
         accepts: &[Port::Surface],

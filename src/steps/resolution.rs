@@ -38,8 +38,9 @@ pub struct ResolutionParams {
     /// The same as a share of the finest mesh's faces, such as `"25%"`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub share: Option<Share>,
-    /// Betters the mesh by flips and relaxation, each certified: stretch, size, valence and distance stay within what the
-    /// mesh has without it. Its faces then are no longer those that were recorded. Default false.
+    /// Betters the mesh by flips and relaxation, each certified: stretch, size and valence stay within what the mesh has
+    /// without it, and so does the distance from the finest mesh, which is itself off the reference of its simplification.
+    /// Its faces then are no longer those that were recorded. Default false.
     pub polish: bool,
 }
 

@@ -42,7 +42,7 @@ use std::sync::Arc;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::mesh::geometry::Aabb;
+use crate::mesh::geometry::{Aabb, triangle_area};
 use crate::mesh::{FaceId, Quads, Surface};
 use crate::metric::quad_layout::Layout as Counts;
 use crate::step::{
@@ -146,6 +146,14 @@ pub enum RoughQuadsError {
     NoBorder {
         /// A face of it.
         face: FaceId,
+    },
+    /// Elements of this size would be many more than the faces that they are made of.
+    #[error("`interval` asks for about {elements:.3e} elements, of a mesh of {faces} faces")]
+    TooFine {
+        /// Squares of that side that the area holds.
+        elements: f64,
+        /// Faces of the mesh.
+        faces: usize,
     },
     /// Elements of this size do not fit between the edges of the mesh.
     #[error("the mesh is too coarse for elements of this size at {} places, the first at face {}", faces.len(), faces[0])]
@@ -256,6 +264,9 @@ fn excess(counts: &Counts, elements: usize) -> [f64; 2] {
 /// makes rows meet that should run on.
 const SNAP: f64 = 0.4;
 
+/// Elements that a face of the mesh may be cut for.
+const MOST_ELEMENTS: f64 = 64.0;
+
 fn rules(surface: &Surface, params: &RoughQuadsParams) -> Result<BeltRules, RoughQuadsError> {
     let diagonal = Aabb::of(surface.points.iter().copied()).diagonal();
     let check = |name, range, value: f64, holds: bool| {
@@ -263,6 +274,11 @@ fn rules(surface: &Surface, params: &RoughQuadsParams) -> Result<BeltRules, Roug
     };
     let interval = params.interval.resolve(diagonal);
     check("interval", "above 0", interval, interval > 0.0)?;
+    let area: f64 = surface.faces.ids().map(|f| triangle_area(surface.corners(f))).sum();
+    let elements = area / (interval * interval);
+    if elements > MOST_ELEMENTS * surface.faces.len() as f64 {
+        return Err(RoughQuadsError::TooFine { elements, faces: surface.faces.len() });
+    }
     check("min-angle", "from 90 to 180", params.min_angle, (90.0..=180.0).contains(&params.min_angle))?;
     let thickness = match &params.thickness {
         None => Thickness::Length(interval),
@@ -304,6 +320,8 @@ impl RoughQuadsError {
             Self::NoBorder { face } => StepFailure::failed(message)
                 .with_help("run `partition` first, or mark closed curves with `features`")
                 .with_elements(vec![element(&face)]),
+            Self::TooFine { .. } => StepFailure::failed(message)
+                .with_help("run `refine` with a smaller `max-edge` first, or raise `interval`"),
             Self::TooCoarse { faces } => StepFailure::failed(message)
                 .with_help("run `refine` with a smaller `max-edge` first, or raise `interval`")
                 .with_elements(faces.iter().take(32).map(element).collect()),

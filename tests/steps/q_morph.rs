@@ -1,7 +1,7 @@
 //! Q-Morph: known answers, quads only, none inverted.
 
 use glam::dvec3;
-use meshmill::mesh::{Soup, Surface};
+use meshmill::mesh::{Facet, Id, Soup, Surface};
 use meshmill::metric::quad_shape::quad_shapes;
 use meshmill::step::Artifact;
 use serde_json::Value;
@@ -126,4 +126,31 @@ fn golden_files() {
     golden("q-morph", "square", "size = 0.2", &surface(plain(&shapes::grid(6))));
     golden("q-morph", "washer", "size = \"6%\"", &run("features", "", &surface(plain(&shapes::washer(20)))).artifact);
     golden("q-morph", "curved", "size = \"9%\", size-curvature = 24", &surface(plain(&shapes::torus(16, 8))));
+}
+
+#[test]
+fn the_wall_of_a_bore_is_meshed_however_coarse() {
+    // Needles from rim to rim have no vertex inside that knows where the wall looks; at some sizes they came to span the bore.
+    let facets = 64;
+    let mut wall = Soup::default();
+    for z in [0.0, 30.0] {
+        for k in 0..facets {
+            let (sin, cos) = libm::sincos(std::f64::consts::TAU * f64::from(k) / f64::from(facets));
+            wall.points.push(dvec3(3.5 * cos, 3.5 * sin, z));
+        }
+    }
+    for k in 0..facets as usize {
+        let [a, b, c, d] = [k, (k + 1) % 64, 64 + (k + 1) % 64, 64 + k].map(Id::new);
+        wall.faces.push(Facet::Tri([a, c, b]));
+        wall.faces.push(Facet::Tri([a, d, c]));
+    }
+    for size in [0.9, 1.249, 1.6, 2.1] {
+        let parts = run("partition", "max-angle = 45", &run("features", "", &surface(plain(&wall))).artifact).artifact;
+        let made = run("q-morph", &format!("size = {size}, tolerance = 0.6, curve-tolerance = 0.18"), &parts);
+        let Artifact::Quads(quads) = made.artifact else { panic!("no quads") };
+        let least = quad_shapes(&quads.mesh).column(|q| q.scaled_jacobian).iter().copied().fold(1.0, f64::min);
+        assert!(least > 0.4, "size {size}: worst {least}");
+        let inside = quads.mesh.points.iter().map(|p| 3.5 - libm::hypot(p.x, p.y)).fold(0.0, f64::max);
+        assert!(inside < 0.01, "size {size}: a vertex lies {inside} off the wall");
+    }
 }

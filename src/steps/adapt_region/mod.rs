@@ -1,7 +1,7 @@
 //! Takes a mesh from a hierarchy that is fine in a region, or where a field asks for it, and coarse elsewhere.
 //!
 //! From a coarse front, nodes of the region whose elements are larger than wanted are split, with whatever must be
-//! split before them.
+//! split before them, until no face at a vertex of the region has a longer side than asked for.
 //!
 //! Based on: H. Date, S. Kanai, T. Kishinami, I. Nishigaki. Mesh Simplification and Adaptive LOD for Finite Element Mesh
 //! Generation, 2005, section 5.3.1.
@@ -15,7 +15,8 @@
 //! # Departures
 //! The region is a set of vertices of the finest mesh, so that it keeps its shape however coarse the front is (the paper
 //! hands a wish down to the nearest child); a field of an analysis may give the sizes, which the paper leaves to future
-//! work.
+//! work. The paper compares the mean size of a vertex's faces when it was made, which lets single faces be several times
+//! larger; here the longest side of every face counts as it is in the result.
 
 mod params;
 mod region;
@@ -35,7 +36,7 @@ use crate::technique::hierarchy::{Front, Thresholds, region_thresholds};
 use crate::technique::levels::{FrontReport, extract_measured};
 use crate::watch::{Cancelled, Watch};
 
-pub use params::{AdaptRegionParams, Ball, BoxRegion, HalfSpace};
+pub use params::{AdaptRegionParams, Ball, BoxRegion, HalfSpace, RegionName};
 
 /// What came out.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
@@ -45,7 +46,7 @@ pub struct AdaptRegionStats {
     pub base_faces: usize,
     /// Vertices of the finest mesh in the region.
     pub vertices_selected: usize,
-    /// Vertices of the region where the mesh is still coarser than asked for: the hierarchy has nothing finer there.
+    /// Vertices of the region at which a face has a longer side than asked for: one of the finest mesh.
     pub vertices_coarser: usize,
     /// The mesh.
     pub front: FrontReport,
@@ -130,11 +131,11 @@ pub fn adapt_region(
     }
     let thresholds: Thresholds = region_thresholds(hierarchy, |leaf| wishes[leaf]);
     watch.phase("refine", None);
-    front.refine_to(&thresholds, watch)?;
-    let stands = front.representatives();
+    front.refine_faces_to(&thresholds, watch)?;
+    let (stands, longest) = (front.representatives(), front.longest_sides());
     let is_coarser = |leaf: usize| {
         let node = stands[NodeId::new(leaf)];
-        node.is_some_and(|node| hierarchy.element_size[node] > wishes.as_slice()[leaf])
+        node.is_some_and(|node| longest[node] > wishes.as_slice()[leaf])
     };
     let coarser = (0..hierarchy.leaf_count()).filter(|&leaf| is_coarser(leaf)).count();
     let (mesh, report) = extract_measured(&front, params.polish, watch)?;
@@ -154,8 +155,8 @@ fn wishes(
     if let Some(inside) = region::vertices(finest, params)? {
         is_anything = true;
         let diagonal = region::diagonal(finest);
-        let stands = front.representatives();
-        let current = |leaf: usize| stands[NodeId::new(leaf)].map_or(0.0, |node| hierarchy.element_size[node]);
+        let (stands, longest) = (front.representatives(), front.longest_sides());
+        let current = |leaf: usize| stands[NodeId::new(leaf)].map_or(0.0, |node| longest[node]);
         for (leaf, _) in inside.enumerate().filter(|(_, is_in)| **is_in) {
             wishes[leaf] = match (params.size, params.ratio) {
                 (Some(size), None) => size.resolve(diagonal),
@@ -186,11 +187,12 @@ impl From<AdaptRegionError> for StepFailure {
             AdaptRegionError::NotOne => Self::failed(message).with_help("for example ratio = 0.5"),
             AdaptRegionError::HalfAField => Self::failed(message)
                 .with_help("values = \"STEP\", field = \"stress\", field-sizes = [[100, \"4%\"], [200, \"1%\"]]"),
+            AdaptRegionError::NoField { .. } => Self::failed(message)
+                .with_help("a column of a CSV file is a field where all its cells are numbers or empty"),
             AdaptRegionError::OutOfRange { .. }
             | AdaptRegionError::BadVector(_)
             | AdaptRegionError::Unknown { .. }
             | AdaptRegionError::NoSuchFace { .. }
-            | AdaptRegionError::NoField { .. }
             | AdaptRegionError::Empty => Self::failed(message),
         }
     }
@@ -202,7 +204,7 @@ pub struct Step;
 
 impl StepContract for Step {
     const NAME: &'static str = "adapt-region";
-    const REVISION: u32 = 3;
+    const REVISION: u32 = 4;
     const INPUTS: &'static [InputDef] = &[
         InputDef {
             name: "from",

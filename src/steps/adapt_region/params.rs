@@ -35,6 +35,16 @@ pub struct HalfSpace {
     pub normal: [f64; 3],
 }
 
+/// A region as a recipe names it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum RegionName {
+    /// By its number.
+    Number(u32),
+    /// By its name, or its number as text.
+    Name(String),
+}
+
 /// Takes a mesh from a hierarchy that is fine in a region, or where a field asks for it, and coarse elsewhere.
 ///
 /// The region is everything that is named, together. Give either `size` or `ratio`.
@@ -44,7 +54,8 @@ pub struct AdaptRegionParams {
     /// The mesh to refine from: a number of faces or a percent of the finest mesh's. Default: the coarsest one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub base: Option<Resolution>,
-    /// Largest element in the region; percents refer to the diagonal. It is kept where the hierarchy is fine enough.
+    /// Longest side of the faces at vertices of the region; percents refer to the diagonal. It is kept but for sides of the
+    /// finest mesh itself.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub size: Option<Length>,
     /// The same relative to the elements of `base` at each place: 0.5 asks for half their size. Above 0, at most 1.
@@ -60,7 +71,7 @@ pub struct AdaptRegionParams {
     /// Face groups.
     pub groups: Vec<String>,
     /// Regions, by name or by number.
-    pub regions: Vec<String>,
+    pub regions: Vec<RegionName>,
     /// Points, in mesh units: the vertex of the finest mesh closest to each.
     pub points: Vec<[f64; 3]>,
     /// Faces of the finest mesh by number, from 0: `resolution` with `share = "100%"` writes that mesh.
@@ -71,7 +82,8 @@ pub struct AdaptRegionParams {
     /// Pairs of a value of the field and the size of elements there, `[[100, "4%"], [200, "1%"]]`, by rising value.
     /// Between two pairs sizes are interpolated; below the first one any size will do, above the last one its size holds.
     pub field_sizes: Vec<(f64, Length)>,
-    /// Betters the mesh by flips and relaxation, each certified: stretch, size, valence and distance stay within what the
-    /// mesh has without it. Its faces then are no longer those that were recorded. Default false.
+    /// Betters the mesh by flips and relaxation, each certified: stretch, size and valence stay within what the mesh has
+    /// without it, and so does the distance from the finest mesh, which is itself off the reference of its simplification.
+    /// Its faces then are no longer those that were recorded. Default false.
     pub polish: bool,
 }

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::{AdaptRegionError, AdaptRegionParams};
+use super::{AdaptRegionError, AdaptRegionParams, RegionName};
 use crate::mesh::bvh::TriangleBvh;
 use crate::mesh::geometry::Aabb;
 use crate::mesh::id::{IdVec, Vertex};
@@ -87,10 +87,15 @@ fn faces_meant(finest: &Surface, params: &AdaptRegionParams) -> Result<Vec<FaceI
         })?;
         meant.extend(members.iter().copied().filter(|f| f.index() < finest.faces.len()));
     }
-    for name in &params.regions {
+    for region in &params.regions {
         let regions = finest.carried.regions.as_ref();
         let names = regions.map_or(&[][..], |regions| &regions.names);
-        let label = names.iter().position(|known| known == name).or_else(|| name.parse().ok());
+        let (label, name) = match region {
+            RegionName::Number(number) => (Some(*number as usize), number.to_string()),
+            RegionName::Name(name) => {
+                (names.iter().position(|known| known == name).or_else(|| name.parse().ok()), name.clone())
+            }
+        };
         let members: Vec<FaceId> = match (regions, label) {
             (Some(regions), Some(label)) => {
                 let labels = regions.labels.enumerate().take(finest.faces.len());
@@ -100,7 +105,7 @@ fn faces_meant(finest: &Surface, params: &AdaptRegionParams) -> Result<Vec<FaceI
         };
         if members.is_empty() {
             let known = list(names.iter());
-            return Err(AdaptRegionError::Unknown { kind: "region", name: name.clone(), known });
+            return Err(AdaptRegionError::Unknown { kind: "region", name, known });
         }
         meant.extend(members);
     }

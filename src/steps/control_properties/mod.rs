@@ -33,8 +33,9 @@ use report::{End, refuse_violations, stats};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::mesh::geometry::triangle_area;
 use crate::mesh::transfer::inherit_fields;
-use crate::mesh::{Hierarchy, LockRules, Surface, resolve_freedom};
+use crate::mesh::{FaceId, Hierarchy, LockRules, Surface, resolve_freedom};
 use crate::step::{
     Artifact, InputDef, Inputs, Length, Locks, OutPort, OutputDef, Port, Produced, ResolvedSizing, Sizing, StepFailure,
 };
@@ -71,6 +72,8 @@ pub struct ControlPropertiesParams {
     /// Longest side of an element. Default: no limit.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub max_size: Option<Sizing>,
+    /// A `max-size` that asks for more faces than this is refused. Default 20 000 000.
+    pub max_faces: usize,
     /// Most edges at a vertex. Default 12; 6 is the mean of any closed mesh, so values below 7 leave little freedom.
     #[schemars(range(min = 6))]
     pub max_valence: usize,
@@ -109,6 +112,7 @@ impl Default for ControlPropertiesParams {
             min_stretch: 0.2,
             mean_stretch: 0.0,
             max_size: None,
+            max_faces: 20_000_000,
             max_valence: 12,
             target_faces: None,
             feature_weight: 100.0,
@@ -229,13 +233,7 @@ fn setup(
     let is_length = params.tolerance_mode == ToleranceMode::Distance;
     check("tolerance", "above 0", tolerance, tolerance > 0.0 || !is_length)?;
     let feature_tolerance = params.feature_tolerance.map_or(0.5 * tolerance, |length| length.resolve(diagonal));
-    let max_size = match &params.max_size {
-        None => SizeField::Uniform(f64::INFINITY),
-        Some(sizing) => match sizing.resolve(input.surface, diagonal).map_err(ControlPropertiesError::Size)? {
-            ResolvedSizing::Uniform(length) => SizeField::Uniform(length),
-            ResolvedSizing::Corners(values) => SizeField::varying(input.surface, values),
-        },
-    };
+    let max_size = max_size(input.surface, params, diagonal)?;
     let limits = Limits { min_stretch: params.min_stretch, max_size, max_valence: params.max_valence };
     Ok(Setup {
         mode: params.tolerance_mode,
@@ -244,6 +242,35 @@ fn setup(
         feature_weight: params.feature_weight,
         limits,
         may_merge_corners: input.locks.keep.is_empty() && input.locks.only.is_empty(),
+    })
+}
+
+/// The longest side allowed, where that does not ask for too many faces.
+fn max_size(
+    surface: &Surface,
+    params: &ControlPropertiesParams,
+    diagonal: f64,
+) -> Result<SizeField, ControlPropertiesError> {
+    let Some(sizing) = &params.max_size else { return Ok(SizeField::Uniform(f64::INFINITY)) };
+    let sizes = sizing.resolve(surface, diagonal).map_err(ControlPropertiesError::Size)?;
+    let least = sizes.least();
+    if least.is_nan() || least <= 0.0 {
+        return Err(ControlPropertiesError::OutOfRange { name: "max-size", range: "above 0", value: least });
+    }
+    let size_of = |f: FaceId| match &sizes {
+        ResolvedSizing::Uniform(length) => *length,
+        ResolvedSizing::Corners(values) => values[f.index()].into_iter().sum::<f64>() / 3.0,
+    };
+    // Equilateral faces of that side are the largest there may be.
+    let equilateral = |side: f64| 0.25 * 3.0_f64.sqrt() * side * side;
+    let least_faces: f64 =
+        surface.faces.ids().map(|f| triangle_area(surface.corners(f)) / equilateral(size_of(f))).sum();
+    if least_faces > params.max_faces as f64 {
+        return Err(ControlPropertiesError::TooManyFaces { least: least_faces, most: params.max_faces });
+    }
+    Ok(match sizes {
+        ResolvedSizing::Uniform(length) => SizeField::Uniform(length),
+        ResolvedSizing::Corners(values) => SizeField::varying(surface, values),
     })
 }
 

@@ -93,6 +93,14 @@ pub enum ControlPropertiesError {
         /// What it is.
         value: f64,
     },
+    /// `max-size` asks for more faces than `max-faces` allows.
+    #[error("`max-size` asks for at least {least:.3e} faces, above `max-faces` = {most}")]
+    TooManyFaces {
+        /// Equilateral faces of that side that the area holds.
+        least: f64,
+        /// `max-faces`.
+        most: usize,
+    },
     /// Thresholds do not hold everywhere, and `on-infeasible` asks for an error then.
     #[error("thresholds break on {faces} faces and {vertices} vertices with too many edges{worst}")]
     Infeasible {
@@ -225,6 +233,9 @@ impl From<ControlPropertiesError> for StepFailure {
                 Self::failed(message).with_help(
                     "relax the threshold, give more tolerance or finer elements, or use `on-infeasible = \"report\"`",
                 )
+            }
+            ControlPropertiesError::TooManyFaces { .. } => {
+                Self::failed(message).with_help("raise `max-size`, or `max-faces` if that is meant")
             }
             ControlPropertiesError::NotASurface(_) => Self::bad_input(message).with_help("run `repair` first"),
             ControlPropertiesError::OutOfRange { .. } | ControlPropertiesError::Locks(_) => Self::failed(message),

@@ -24,6 +24,7 @@ pub(super) struct SmallBox {
 impl SmallBox {
     pub(super) const EMPTY: Self = Self { min: Vec3::INFINITY, max: Vec3::NEG_INFINITY };
 
+    #[inline]
     fn of(points: &[DVec3], origin: DVec3) -> Self {
         let mut all = Self::EMPTY;
         for &p in points {
@@ -37,14 +38,17 @@ impl SmallBox {
         all
     }
 
+    #[inline]
     pub(super) fn union(self, other: Self) -> Self {
         Self { min: self.min.min(other.min), max: self.max.max(other.max) }
     }
 
+    #[inline]
     pub(super) fn overlaps(self, other: Self) -> bool {
         self.min.cmple(other.max).all() && other.min.cmple(self.max).all()
     }
 
+    #[inline]
     fn contains(self, other: Self) -> bool {
         self.min.cmple(other.min).all() && other.max.cmple(self.max).all()
     }

@@ -7,6 +7,7 @@
 use glam::DVec3;
 
 use super::boxes::{BoxTree, Near, SmallBox};
+use super::drift::Drift;
 use crate::mesh::halfedge::HalfedgeMesh;
 use crate::mesh::predicate::triangle_triangle;
 use crate::mesh::{FaceId, VertexId};
@@ -15,6 +16,7 @@ use crate::mesh::{FaceId, VertexId};
 #[derive(Clone, Debug)]
 pub struct Collision {
     tree: BoxTree,
+    star: Drift,
     new_boxes: Vec<SmallBox>,
     near: Vec<Near>,
 }
@@ -22,7 +24,7 @@ pub struct Collision {
 impl Collision {
     /// Of all live faces.
     pub fn new(mesh: &HalfedgeMesh) -> Self {
-        Self { tree: BoxTree::new(mesh), new_boxes: Vec::new(), near: Vec::new() }
+        Self { tree: BoxTree::new(mesh), star: Drift::default(), new_boxes: Vec::new(), near: Vec::new() }
     }
 
     /// Tells of a face that has changed, or of a new one that lies where `sibling` lies.
@@ -43,6 +45,7 @@ impl Collision {
     /// Whether a new face would meet another new one, or a face that stays, where they share no corner or edge. New ones
     /// that are known to be one sheet do not meet each other.
     pub fn hits(&mut self, mesh: &HalfedgeMesh, old: &[FaceId], new: &[[DVec3; 3]], is_sheet: bool) -> bool {
+        let is_sheet = is_sheet || self.star.sees_sheet(new);
         for (i, &a) in new.iter().enumerate().filter(|_| !is_sheet) {
             if new[..i].iter().any(|&b| !clearly_apart(a, b) && triangle_triangle(a, b).is_intersection()) {
                 return true;

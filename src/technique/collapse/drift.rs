@@ -89,7 +89,7 @@ struct Inner {
 }
 
 /// The overlay of an edit's old and new faces.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Drift {
     /// Whether the new faces were seen as one sheet, in which they meet in common corners and edges only.
     pub(super) is_sheet: bool,
@@ -121,12 +121,7 @@ impl Drift {
 
     /// Lays the old faces under the star.
     fn overlay(&mut self, old: &[Triangle], strays: &[f64], new: &[Triangle]) -> Option<()> {
-        if !(3..=MOST_FACES).contains(&new.len()) {
-            return None;
-        }
-        let tip = new[0].into_iter().find(|p| new.iter().all(|face| face.contains(p)))?;
-        let view = View::new(tip, new)?;
-        self.close(&view, new)?;
+        let view = self.spread(new)?;
         self.inner.clear();
         let (mut rims, mut tips) = (0, 0);
         for (face, &under) in old.iter().zip(strays) {
@@ -151,6 +146,22 @@ impl Drift {
             }
         }
         (rims == new.len() && tips > 0 && self.place_inner()).then_some(())
+    }
+
+    /// Whether the faces are a star that is seen as one sheet: then they meet in common corners and edges only.
+    pub(super) fn sees_sheet(&mut self, star: &[Triangle]) -> bool {
+        self.spread(star).is_some()
+    }
+
+    /// The view in which the faces lie side by side, all round a common corner.
+    fn spread(&mut self, star: &[Triangle]) -> Option<View> {
+        if !(3..=MOST_FACES).contains(&star.len()) {
+            return None;
+        }
+        let tip = star[0].into_iter().find(|p| star.iter().all(|face| face.contains(p)))?;
+        let view = View::new(tip, star)?;
+        self.close(&view, star)?;
+        Some(view)
     }
 
     /// The sectors of a star that surrounds its tip once.

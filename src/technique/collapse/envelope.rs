@@ -24,6 +24,7 @@ use super::cover::{Cover, Reach};
 use super::drift::Drift;
 use super::target::Target;
 use crate::mesh::bvh::TriangleBvh;
+use crate::mesh::geometry::closest_on_triangle;
 use crate::mesh::halfedge::HalfedgeMesh;
 use crate::mesh::{FaceId, Surface};
 
@@ -142,6 +143,12 @@ impl<'a> Envelope<'a> {
     /// The point of the reference nearest to `p`, and the face it lies on.
     pub fn project(&self, p: DVec3) -> Option<(DVec3, FaceId)> {
         self.tree.closest(p).map(|c| (c.nearest.point, c.face()))
+    }
+
+    /// As [`Envelope::project`], with a face that is probably near: the same answer, found faster where it is.
+    pub fn project_near(&self, p: DVec3, face: FaceId) -> Option<DVec3> {
+        let bound = closest_on_triangle(p, self.reference.corners(face)).distance_squared;
+        self.tree.closest_within(p, bound).map(|c| c.nearest.point)
     }
 
     /// Whether `p` lies within the tolerance.

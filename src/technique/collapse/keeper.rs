@@ -64,6 +64,15 @@ impl Keeper<'_> {
         }
     }
 
+    /// As [`Keeper::project`] for many points near `middle`.
+    pub fn project_round(&self, middle: DVec3, points: &mut [DVec3]) {
+        let Self::Distance { envelope, .. } = self else { return };
+        let Some((_, face)) = envelope.project(middle) else { return };
+        for p in points {
+            *p = envelope.project_near(*p, face).unwrap_or(*p);
+        }
+    }
+
     /// The point of the reference's curves nearest to `p`, where the tolerance has a reference.
     pub fn project_to_curve(&self, p: DVec3) -> Option<DVec3> {
         match self {

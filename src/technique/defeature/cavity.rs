@@ -16,6 +16,8 @@ const PARALLEL: f64 = 0.99;
 const CONCENTRIC: f64 = 0.05;
 /// A chamfer or countersink is at most this much wider than its hole.
 const WIDEST_CONE: f64 = 2.0;
+/// A side up to this much wider than its hole is a step of it; a wider one is a pocket with a hole in its floor.
+const WIDEST_STEP: f64 = 3.0;
 /// A floor lies within this much of its rim's radius.
 const WIDEST_FLOOR: f64 = 1.1;
 
@@ -38,6 +40,8 @@ enum End {
     Base(u32, usize),
     /// At a floor, which is in the chain already.
     Floor,
+    /// Nowhere: the feature has a step that is too wide to be removed.
+    TooWide,
 }
 
 /// Looks for features on the patches of a surface.
@@ -102,14 +106,14 @@ impl<'a> Finder<'a> {
     /// The chain through a side.
     fn grow(&self, seed: u32, ring: &Ring) -> Option<Cavity> {
         let mut patches = vec![seed];
-        let ends = [0, 1].map(|rim| self.extend(seed, rim, ring, &mut patches));
-        let rims: Vec<(u32, usize)> = ends
-            .iter()
-            .filter_map(|end| match *end {
-                End::Base(patch, rim) => Some((patch, rim)),
-                End::Floor => None,
-            })
-            .collect();
+        let mut rims: Vec<(u32, usize)> = Vec::new();
+        for rim in [0, 1] {
+            match self.extend(seed, rim, ring, &mut patches) {
+                End::Base(patch, rim) => rims.push((patch, rim)),
+                End::Floor => {}
+                End::TooWide => return None,
+            }
+        }
         let kind = match (ring.facing, rims.len()) {
             (Facing::In, 2) => Kind::ThroughHoles,
             (Facing::In, 1) => Kind::BlindHoles,
@@ -136,25 +140,30 @@ impl<'a> Finder<'a> {
                 return End::Floor;
             }
             let Some(ring) = self.coaxial(next, seed) else { return here };
-            let goes_on = match ring.form {
-                Form::Side | Form::Cone => self.belongs(ring, seed),
+            let decisive = match ring.form {
+                Form::Side | Form::Cone => Some(ring),
                 Form::Flat => self
                     .patches
                     .across(&self.patches.all[next as usize].rims[1 - entered])
                     .filter(|(beyond, _)| !chain.contains(beyond))
                     .and_then(|(beyond, _)| self.coaxial(beyond, seed))
-                    .is_some_and(|beyond| beyond.form != Form::Flat && self.belongs(beyond, seed)),
+                    .filter(|beyond| beyond.form != Form::Flat),
             };
-            if !goes_on {
-                return here;
+            let Some(ring) = decisive.filter(|ring| self.belongs(ring, seed)) else { return here };
+            if ring.form == Form::Side && ring.diameter() > self.most {
+                return End::TooWide;
             }
             chain.push(next);
             (patch, rim) = (next, 1 - entered);
         }
     }
 
+    /// Whether a ring is a part of the same feature, be it too wide to be removed.
     fn belongs(&self, ring: &Ring, seed: &Ring) -> bool {
-        let most = if ring.form == Form::Cone { WIDEST_CONE * seed.diameter() } else { self.most };
+        let most = match ring.form {
+            Form::Cone => WIDEST_CONE * seed.diameter(),
+            Form::Side | Form::Flat => self.most.max(WIDEST_STEP * seed.diameter()),
+        };
         ring.facing == seed.facing && ring.diameter() <= most && ring.error() <= ROUND
     }
 

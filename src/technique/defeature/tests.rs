@@ -209,6 +209,24 @@ fn steps_chamfers_and_floors_go_with_their_hole() {
 }
 
 #[test]
+fn a_hole_with_a_step_that_is_too_wide_stays_whole() {
+    let cells = [
+        hole(&[(0.5, 1.0), (0.5, 0.6), (0.3, 0.6), (0.3, 0.0)], true),
+        // Over a countersink.
+        hole(&[(0.5, 1.0), (0.5, 0.6), (0.3, 0.4), (0.3, 0.0)], true),
+        // A pocket with a small hole in its floor, which is a feature of its own.
+        hole(&[(0.9, 1.0), (0.9, 0.6), (0.2, 0.6), (0.2, 0.0)], true),
+    ];
+    let mesh = plate(&cells);
+    assert_eq!(validate_surface(&mesh), []);
+    let (result, report) = removed(&mesh, 0.7, &HOLES);
+    let [only] = &report.removed[..] else { panic!("{report:?}") };
+    assert!((only.diameter - 0.4).abs() < 1e-9, "{report:?}");
+    assert_eq!(characteristic(&result), characteristic(&mesh) + 2);
+    assert!(report.rejected.iter().all(|r| r.reason == Reason::TooLarge), "{report:?}");
+}
+
+#[test]
 fn bosses_go_when_asked_for_and_the_hole_in_one_first() {
     let cells = [
         hole(&[(0.4, 1.0), (0.4, 1.5), (0.0, 1.5)], false),

@@ -68,6 +68,41 @@ impl Front<'_> {
     }
 }
 
+impl Front<'_> {
+    /// As [`Front::refine_to`], and on until no face has a side longer than the threshold of any of its corners, but for
+    /// sides of the finest mesh.
+    ///
+    /// A node's recorded size is the mean over its star when it was made; its faces grow when neighbours merge later, and
+    /// the longest one counts here. O(finest faces) a round; few rounds.
+    pub fn refine_faces_to(&mut self, thresholds: &Thresholds, watch: &Watch) -> Result<(), Cancelled> {
+        self.refine_to(thresholds, watch)?;
+        loop {
+            watch.check()?;
+            let mut coarse: Vec<NodeId> =
+                self.faces().into_iter().filter_map(|corners| self.coarse_end(corners, thresholds)).collect();
+            coarse.sort_unstable();
+            coarse.dedup();
+            for &node in coarse.iter().rev() {
+                self.force_split(node);
+            }
+            if coarse.is_empty() {
+                return Ok(());
+            }
+        }
+    }
+
+    /// The end of a face's longest side that was merged last, where the side is too long for a corner; `None` where it is
+    /// not, or neither end can be split.
+    fn coarse_end(&self, corners: [NodeId; 3], thresholds: &Thresholds) -> Option<NodeId> {
+        let points = corners.map(|node| self.hierarchy().point(node));
+        let sides = [(0, 1), (1, 2), (2, 0)].map(|(i, j)| (points[i].distance(points[j]), corners[i].max(corners[j])));
+        let wish = corners.into_iter().map(|node| thresholds[node]).fold(f64::INFINITY, f64::min);
+        let too_long =
+            sides.into_iter().filter(|&(length, end)| length > wish && self.hierarchy().merge(end).is_some());
+        too_long.max_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1))).map(|(_, end)| end)
+    }
+}
+
 /// Moves a front to another face count with the distribution of element sizes kept.
 ///
 /// Every node has a reference size: its own on the starting front, below it that of its ancestor on the front, above it

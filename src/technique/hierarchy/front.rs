@@ -1,5 +1,6 @@
 //! A front in the vertex forest and the operations that move it.
 
+use crate::mesh::geometry::triangle_size;
 use crate::mesh::hierarchy::{Hierarchy, Node, NodeId};
 use crate::mesh::id::IdVec;
 
@@ -91,6 +92,29 @@ impl<'a> Front<'a> {
             };
         }
         stands
+    }
+
+    /// The faces of the mesh by their corners, in the order of the finest mesh. O(nodes + finest faces).
+    pub fn faces(&self) -> Vec<[NodeId; 3]> {
+        let stands = self.representatives();
+        let corners = self.hierarchy.finest.faces.iter().map(|face| face.map(|v| stands[NodeId::from_raw(v.raw())]));
+        let live = corners.filter_map(|corners| match corners {
+            [Some(a), Some(b), Some(c)] if a != b && b != c && c != a => Some([a, b, c]),
+            _ => None,
+        });
+        live.collect()
+    }
+
+    /// The longest side of the faces at each node of the front; 0 at the others. O(nodes + finest faces).
+    pub fn longest_sides(&self) -> IdVec<Node, f64> {
+        let mut longest = IdVec::filled(0.0, self.place.len());
+        for corners in self.faces() {
+            let size = triangle_size(corners.map(|node| self.hierarchy.point(node)));
+            for node in corners {
+                longest[node] = size.max(longest[node]);
+            }
+        }
+        longest
     }
 
     /// Whether the node may be split as it is.

@@ -4,7 +4,7 @@ use super::Remesher;
 use crate::technique::mixed::{NONE, Place};
 
 /// The part of the tolerance that chords of triangles may use: quads made of them lie farther away.
-const SHARE: f64 = 0.4;
+pub(super) const SHARE: f64 = 0.4;
 
 impl Remesher<'_, '_> {
     /// Lowers sizes where chords leave the surface, and where two curves are nearer than the size. Whether it did.

@@ -4,6 +4,7 @@ use glam::DVec3;
 use smallvec::{SmallVec, smallvec};
 
 use super::Remesher;
+use super::adapt::SHARE;
 use crate::mesh::geometry::area_vector;
 use crate::technique::mixed::{Corners, Mixed, NONE, Place, triangle_quality};
 
@@ -183,6 +184,9 @@ impl Remesher<'_, '_> {
         if !self.fits([a, d, c], [p, s, r], reference) || !self.fits([d, b, c], [s, q, r], reference) {
             return false;
         }
+        if self.leaves_surface(h, [p, q], [r, s]) {
+            return false;
+        }
         let poor = |v| self.mesh.place(v).is_free() && self.mesh.valence(v) <= 4;
         if poor(a)
             || poor(b)
@@ -201,6 +205,17 @@ impl Remesher<'_, '_> {
             self.mesh.rollback();
             false
         }
+    }
+
+    /// Whether a flip takes the middle of its edge away from the surface, by more than chords may be off. Needles from rim to
+    /// rim of a bore have no vertex inside that knows where the surface looks: flip by flip, each a small turn, they would
+    /// come to span the bore.
+    fn leaves_surface(&self, h: u32, before: [DVec3; 2], after: [DVec3; 2]) -> bool {
+        let region = self.mesh.region(self.mesh.face(h));
+        let off = |[p, q]: [DVec3; 2]| self.ground.project_from(region, 0.5 * (p + q), p).distance_squared;
+        let may = SHARE * self.rules.tolerance;
+        let after = off(after);
+        after > may * may && after > off(before)
     }
 
     /// Whether a face may become another one: not a poorer needle, not over, and to the side of the surface.

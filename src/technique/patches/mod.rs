@@ -2,8 +2,8 @@
 //!
 //! The common curves come first, least squares over the path with both ends fixed, so that neighbours share them; then
 //! the control points inside, least squares over the covered vertices with a thin-plate term, whose parameters are then
-//! corrected to the feet of the vertices and the fit repeated. A patch farther from its vertices than the tolerance gets
-//! twice the spans, where that helps. Patches meet in common curves, which follow the paths without their zigzag; the
+//! corrected to the feet of the vertices and the fit repeated. A patch farther from the mesh than the tolerance, or the mesh
+//! from it, gets twice the spans, where that helps. Patches meet in common curves, which follow the paths without their zigzag; the
 //! angle between their tangent planes is measured. On demand smooth seams get a common plane at each of their points:
 //! curves leave their nodes in one plane, and the control points next to a seam are drawn into the mean of the planes of
 //! both patches, by the same least squares, as far as the tolerance allows and no patch folds. That is tangent continuity
@@ -12,8 +12,10 @@
 //! Based on: M. Eck, H. Hoppe. Automatic Reconstruction of B-Spline Surfaces of Arbitrary Topological Type. SIGGRAPH,
 //! 1996; J. Hoschek. Intrinsic Parametrization for Approximation. CAGD 5, 1988.
 
+mod fit;
 mod flatten;
 mod frame;
+mod measure;
 mod refine;
 pub mod sample;
 pub mod solve;
@@ -22,21 +24,22 @@ pub mod tangent;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use crate::mesh::bvh::TriangleBvh;
-use crate::mesh::patches::{Patch, Patches, Seam};
-use crate::mesh::{Quads, Soup, Surface, VertexId};
+use crate::mesh::patches::{Patch, Patches};
+use crate::mesh::{Quads, Surface, VertexId};
 use crate::technique::layout::Ground;
 use crate::watch::{Cancelled, Watch};
+use fit::Fit;
 pub use frame::FrameError;
 use frame::{Frame, covered, frame};
+use measure::{Distances, angles, seams};
 use refine::{Fault, Spans};
-use solve::{Curve, Samples, fit_curve, fit_curve_with, fit_inside, fit_tangent};
-use tangent::{Tangency, end_planes, is_inside};
+use solve::{Curve, fit_curve, fit_curve_with, fit_inside};
+use tangent::{end_planes, is_inside};
 
 /// How patches are fitted.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FitRules {
-    /// Patches farther from their vertices are refined; mesh units.
+    /// Patches farther from the mesh, or the mesh from them, are refined; mesh units.
     pub tolerance: f64,
     /// Most spans in each direction.
     pub max_spans: usize,
@@ -60,13 +63,6 @@ pub enum FitError {
     Cancelled(#[from] Cancelled),
 }
 
-/// An element on its way to a patch.
-struct Fit {
-    spans: usize,
-    samples: Samples,
-    patch: Patch,
-}
-
 /// Fits patches to the faces that each element covers.
 ///
 /// # Errors
@@ -76,8 +72,9 @@ pub fn fit_patches(surface: &Surface, quads: &Quads, rules: &FitRules, watch: &W
     let ground = Ground::new(&surface);
     let frame = frame(&ground, quads)?;
     watch.phase("fit", None);
-    let mut fits: Vec<Fit> = (0..frame.sides.len()).into_par_iter().map(|e| begin(&frame, e)).collect();
+    let mut fits: Vec<Fit> = (0..frame.sides.len()).into_par_iter().map(|e| Fit::begin(&frame, e)).collect();
     let mut spans = Spans::new(fits.len());
+    let distances = Distances::from(&surface);
     loop {
         watch.check()?;
         let counts = spans.counts();
@@ -89,7 +86,7 @@ pub fn fit_patches(surface: &Surface, quads: &Quads, rules: &FitRules, watch: &W
             smooth(&frame, &mut fits, counts, &curves, rules);
         }
         watch.check()?;
-        let errors = errors(&frame, &fits);
+        let errors = distances.of(&frame, &fits);
         let angles = angles(&frame, &fits);
         for (fit, error) in fits.iter_mut().zip(&errors) {
             (fit.patch.max_error, fit.patch.rms_error) = *error;
@@ -105,19 +102,6 @@ pub fn fit_patches(surface: &Surface, quads: &Quads, rules: &FitRules, watch: &W
     let patches: Vec<Patch> = fits.into_iter().map(|fit| fit.patch).collect();
     let tessellation = sample::tessellate(&frame, &patches, rules.density);
     Ok(Patches { patches, seams, tessellation })
-}
-
-fn begin(frame: &Frame<'_>, element: usize) -> Fit {
-    Fit { spans: 0, samples: flatten::flatten(frame, element), patch: Patch::default() }
-}
-
-/// For each element the largest angle between planes along its smooth seams; degrees.
-fn angles(frame: &Frame<'_>, fits: &[Fit]) -> Vec<f64> {
-    let mut angles = vec![0.0_f64; fits.len()];
-    for seam in seams(frame, fits).into_iter().filter(|seam| seam.is_smooth) {
-        seam.patches.iter().for_each(|&e| angles[e as usize] = angles[e as usize].max(seam.angle));
-    }
-    angles
 }
 
 /// Curves that leave each node in the planes that their sectors have there.
@@ -226,134 +210,6 @@ fn curves(frame: &Frame<'_>, spans: &[usize], rules: &FitRules) -> Vec<Curve> {
     frame.arcs.par_iter().map(fit).collect()
 }
 
-impl Fit {
-    /// Fits the inside under the curves given, and corrects the parameters.
-    fn solve(&mut self, frame: &Frame<'_>, element: usize, spans: usize, curves: &[Curve], rules: &FitRules) {
-        /// Rounds of parameter correction; later ones change little.
-        const ROUNDS: usize = 3;
-        self.set_border(frame, element, spans, curves);
-        for _ in 0..ROUNDS {
-            fit_inside(&mut self.patch, &self.samples, rules.fairness);
-            self.correct();
-        }
-        fit_inside(&mut self.patch, &self.samples, rules.fairness);
-    }
-
-    /// Starts from the curves given.
-    fn set_border(&mut self, frame: &Frame<'_>, element: usize, spans: usize, curves: &[Curve]) {
-        let sides = &frame.sides[element];
-        // The finest of its curves decides, so that each is reproduced exactly.
-        let most = sides.iter().map(|&(arc, _)| curves[arc].spans).max().unwrap_or(1).max(spans);
-        self.spans = most;
-        let border: Vec<Vec<DVec3>> = sides
-            .iter()
-            .map(|&(arc, is_along)| {
-                let mut controls = curves[arc].refined(most).controls;
-                if !is_along {
-                    controls.reverse();
-                }
-                controls
-            })
-            .collect();
-        self.patch = with_border(most, &border);
-    }
-
-    /// Fits the inside with the derivatives across smooth seams in the planes given, as far as the tolerance allows.
-    fn solve_tangent(&mut self, frame: &Frame<'_>, element: usize, normals: &[Vec<(f64, DVec3)>], rules: &FitRules) {
-        /// A slope of one counts as much as a distance of so many times the tolerance: of 100, two degrees as three and
-        /// a half. Less where the patch would leave the tolerance for it.
-        const REACH: [f64; 4] = [100.0, 30.0, 10.0, 3.0];
-        /// The thin-plate term counts more here, for slopes alone leave room to swing.
-        const FAIR: f64 = 1e-3;
-        let planes = self.tangencies(frame, element, normals);
-        if planes.is_empty() {
-            return;
-        }
-        let fairness = rules.fairness.max(FAIR);
-        let (before, folds) = ((self.patch.clone(), self.samples.places.clone()), self.folds());
-        for reach in REACH {
-            fit_tangent(&mut self.patch, &self.samples, fairness, (&planes, reach * rules.tolerance));
-            self.correct();
-            if self.error() <= rules.tolerance && self.folds() <= folds {
-                return;
-            }
-            (self.patch, self.samples.places) = before.clone();
-        }
-    }
-
-    /// Where the patch shall have the planes given.
-    fn tangencies(&self, frame: &Frame<'_>, element: usize, normals: &[Vec<(f64, DVec3)>]) -> Vec<Tangency> {
-        /// Of the patch's size, what a derivative counts as at least.
-        const LEAST: f64 = 0.2;
-        let sides = &frame.sides[element];
-        let size = self.samples.weights.iter().sum::<f64>().max(0.0).sqrt().max(f64::MIN_POSITIVE);
-        let mut planes = Vec::new();
-        for (side, &(arc, is_along)) in sides.iter().enumerate() {
-            for &(t, normal) in &normals[arc] {
-                let place = on_side(side, sides.len(), if is_along { t } else { 1.0 - t });
-                // Of a triangle the side v = 1 is a point, and the last side is u = 0.
-                let is_along_u = side % 2 == 1 || sides.len() == 3 && side == 2;
-                let [_, su, sv] = self.patch.eval(place[0], place[1]);
-                // Next to a flat corner the derivative is about nothing, and must not count without bound for that.
-                let length = if is_along_u { su } else { sv }.length().max(LEAST * size);
-                planes.push(Tangency { place, is_along_u, normal: normal / length });
-            }
-        }
-        planes
-    }
-
-    /// The largest distance of a sample from the point of the patch that it belongs to.
-    fn error(&self) -> f64 {
-        let pairs = self.samples.points.iter().zip(&self.samples.places);
-        pairs.map(|(&p, &[u, v])| self.patch.point(u, v).distance(p)).fold(0.0, f64::max)
-    }
-
-    /// At how many places of a grid, sides included, the patch looks away from where it looks as a whole.
-    fn folds(&self) -> usize {
-        const PLACES: usize = 13;
-        let at = |k: usize| k as f64 / (PLACES - 1) as f64;
-        let across = |k: usize| {
-            let [_, su, sv] = self.patch.eval(at(k % PLACES), at(k / PLACES));
-            su.cross(sv)
-        };
-        let all: Vec<DVec3> = (0..PLACES * PLACES).map(across).collect();
-        let mean: DVec3 = all.iter().sum();
-        all.iter().filter(|normal| normal.dot(mean) < 0.0).count()
-    }
-
-    fn correct(&mut self) {
-        for (place, &p) in self.samples.places.iter_mut().zip(&self.samples.points) {
-            *place = self.patch.foot(p, *place);
-        }
-    }
-}
-
-/// A patch with these sides, counter-clockwise, its inside a Coons patch of the control points.
-fn with_border(spans: usize, sides: &[Vec<DVec3>]) -> Patch {
-    let n = spans + 3;
-    let is_triangle = sides.len() == 3;
-    let mut patch = Patch { spans: [spans; 2], controls: vec![DVec3::ZERO; n * n], is_triangle, ..Patch::default() };
-    let apex = sides[sides.len() - 1][0];
-    let top = |i: usize| if is_triangle { apex } else { sides[2][n - 1 - i] };
-    let left = |j: usize| sides[sides.len() - 1][n - 1 - j];
-    let (bottom, right) = (|i: usize| sides[0][i], |j: usize| sides[1][j]);
-    for j in 0..n {
-        for i in 0..n {
-            let (u, v) = (i as f64 / (n - 1) as f64, j as f64 / (n - 1) as f64);
-            let ruled = bottom(i) * (1.0 - v) + top(i) * v + left(j) * (1.0 - u) + right(j) * u;
-            let corners = bottom(0).lerp(bottom(n - 1), u) * (1.0 - v) + top(0).lerp(top(n - 1), u) * v;
-            patch.controls[j * n + i] = match (i, j) {
-                (_, 0) => bottom(i),
-                (_, _) if j == n - 1 => top(i),
-                (0, _) => left(j),
-                (_, _) if i == n - 1 => right(j),
-                _ => ruled - corners,
-            };
-        }
-    }
-    patch
-}
-
 /// Where a side runs on a patch: the place at `t` along the side.
 fn on_side(side: usize, count: usize, t: f64) -> [f64; 2] {
     match (side, count) {
@@ -377,46 +233,4 @@ fn at_seam(frame: &Frame<'_>, arc: usize, t: f64) -> Option<[(usize, [f64; 2]); 
         (e, on_side(side, frame.sides[e].len(), if is_along { t } else { 1.0 - t }))
     };
     Some([place(first), place(second)])
-}
-
-/// Largest and root mean square distance of each element's vertices from all patches together.
-fn errors(frame: &Frame<'_>, fits: &[Fit]) -> Vec<(f64, f64)> {
-    /// Elements of the mesh for distances along a side of a patch.
-    const FINE: usize = 16;
-    let patches: Vec<Patch> = fits.iter().map(|fit| fit.patch.clone()).collect();
-    let fine: Soup = sample::tessellate(frame, &patches, FINE);
-    let tree = TriangleBvh::of_surface(&sample::triangles(&fine));
-    let ground = frame.layout.ground;
-    let of_element = |(e, fit): (usize, &Fit)| {
-        let own = fit.samples.points.iter().zip(&fit.samples.places).map(|(&p, &place)| {
-            let [u, v] = fit.patch.foot(p, place);
-            let own = fit.patch.point(u, v).distance(p);
-            tree.closest_within(p, own * own).map_or(own, |near| near.distance().min(own))
-        });
-        let rim = frame.sides[e].iter().flat_map(|&(arc, _)| &frame.arcs[arc].path);
-        let rim = rim.map(|&v| tree.closest(ground.point(v)).map_or(0.0, |near| near.distance()));
-        let all: Vec<f64> = own.chain(rim).collect();
-        (all.iter().copied().fold(0.0, f64::max), crate::metric::summary::rms(&all).unwrap_or(0.0))
-    };
-    fits.par_iter().enumerate().map(of_element).collect()
-}
-
-/// The angle between the tangent planes along each inner arc.
-fn seams(frame: &Frame<'_>, fits: &[Fit]) -> Vec<Seam> {
-    /// Places along a seam where the planes are compared; the ends are common to more than two patches.
-    const PLACES: usize = 16;
-    let seam = |arc: usize| {
-        let mut angle = 0.0_f64;
-        let mut pair = None;
-        for k in 1..PLACES {
-            let [a, b] = at_seam(frame, arc, k as f64 / PLACES as f64)?;
-            let normals = [a, b].map(|(e, uv)| normal(&fits[e].patch, uv));
-            // Planes have no sides: at a corner of nearly 180 degrees the order of the derivatives may swap.
-            let between = crate::mesh::geometry::angle(normals[0], normals[1]).to_degrees();
-            angle = angle.max(between.min(180.0 - between));
-            pair = Some([a.0 as u32, b.0 as u32]);
-        }
-        pair.map(|patches| Seam { patches, angle, is_smooth: frame.arcs[arc].is_smooth })
-    };
-    (0..frame.arcs.len()).filter_map(seam).collect()
 }

@@ -5,7 +5,7 @@ use super::FitRules;
 /// How far a patch is from what it should be.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Fault {
-    /// Largest distance of a covered vertex from the patches; mesh units.
+    /// Largest distance between the patch and the mesh, both ways; mesh units.
     pub(super) error: f64,
     /// Largest angle between planes along its smooth seams; degrees.
     pub(super) angle: f64,

@@ -245,7 +245,9 @@ fn around(editor: &Editor<'_>, v: VertexId) -> Vec<DVec3> {
         at + step * shortest * (cos * across + sin * along)
     };
     let wishes = STEPS.into_iter().flat_map(|step| (0..DIRECTIONS).map(move |k| (step, k)));
-    wishes.map(|(step, k)| wish(step, k)).map(|p| editor.keeper.project(p).unwrap_or(p)).collect()
+    let mut places: Vec<DVec3> = wishes.map(|(step, k)| wish(step, k)).collect();
+    editor.keeper.project_round(at, &mut places);
+    places
 }
 
 /// Places along the curve of a vertex.

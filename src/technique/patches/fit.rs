@@ -1,0 +1,163 @@
+//! One element on its way to a patch: its samples, and the fits of the patch under curves and planes.
+
+use glam::DVec3;
+
+use super::flatten::flatten;
+use super::frame::Frame;
+use super::solve::{Curve, Samples, fit_inside, fit_tangent};
+use super::tangent::Tangency;
+use super::{FitRules, on_side};
+use crate::mesh::patches::Patch;
+
+/// An element on its way to a patch.
+pub(super) struct Fit {
+    pub(super) spans: usize,
+    pub(super) samples: Samples,
+    pub(super) patch: Patch,
+}
+
+impl Fit {
+    /// The samples of an element, still without a patch.
+    pub(super) fn begin(frame: &Frame<'_>, element: usize) -> Self {
+        Self { spans: 0, samples: flatten(frame, element), patch: Patch::default() }
+    }
+
+    /// Fits the inside under the curves given, and corrects the parameters.
+    pub(super) fn solve(
+        &mut self,
+        frame: &Frame<'_>,
+        element: usize,
+        spans: usize,
+        curves: &[Curve],
+        rules: &FitRules,
+    ) {
+        /// Rounds of parameter correction; later ones change little.
+        const ROUNDS: usize = 3;
+        self.set_border(frame, element, spans, curves);
+        for _ in 0..ROUNDS {
+            fit_inside(&mut self.patch, &self.samples, rules.fairness);
+            self.correct();
+        }
+        fit_inside(&mut self.patch, &self.samples, rules.fairness);
+    }
+
+    /// Starts from the curves given.
+    pub(super) fn set_border(&mut self, frame: &Frame<'_>, element: usize, spans: usize, curves: &[Curve]) {
+        let sides = &frame.sides[element];
+        // The finest of its curves decides, so that each is reproduced exactly.
+        let most = sides.iter().map(|&(arc, _)| curves[arc].spans).max().unwrap_or(1).max(spans);
+        self.spans = most;
+        let border: Vec<Vec<DVec3>> = sides
+            .iter()
+            .map(|&(arc, is_along)| {
+                let mut controls = curves[arc].refined(most).controls;
+                if !is_along {
+                    controls.reverse();
+                }
+                controls
+            })
+            .collect();
+        self.patch = with_border(most, &border);
+    }
+
+    /// Fits the inside with the derivatives across smooth seams in the planes given, as far as the tolerance allows.
+    pub(super) fn solve_tangent(
+        &mut self,
+        frame: &Frame<'_>,
+        element: usize,
+        normals: &[Vec<(f64, DVec3)>],
+        rules: &FitRules,
+    ) {
+        /// A slope of one counts as much as a distance of so many times the tolerance: of 100, two degrees as three and
+        /// a half. Less where the patch would leave the tolerance for it.
+        const REACH: [f64; 4] = [100.0, 30.0, 10.0, 3.0];
+        /// The thin-plate term counts more here, for slopes alone leave room to swing.
+        const FAIR: f64 = 1e-3;
+        let planes = self.tangencies(frame, element, normals);
+        if planes.is_empty() {
+            return;
+        }
+        let fairness = rules.fairness.max(FAIR);
+        let (before, folds) = ((self.patch.clone(), self.samples.places.clone()), self.folds());
+        for reach in REACH {
+            fit_tangent(&mut self.patch, &self.samples, fairness, (&planes, reach * rules.tolerance));
+            self.correct();
+            if self.error() <= rules.tolerance && self.folds() <= folds {
+                return;
+            }
+            (self.patch, self.samples.places) = before.clone();
+        }
+    }
+
+    /// Where the patch shall have the planes given.
+    fn tangencies(&self, frame: &Frame<'_>, element: usize, normals: &[Vec<(f64, DVec3)>]) -> Vec<Tangency> {
+        /// Of the patch's size, what a derivative counts as at least.
+        const LEAST: f64 = 0.2;
+        let sides = &frame.sides[element];
+        let size = self.samples.weights.iter().sum::<f64>().max(0.0).sqrt().max(f64::MIN_POSITIVE);
+        let mut planes = Vec::new();
+        for (side, &(arc, is_along)) in sides.iter().enumerate() {
+            for &(t, normal) in &normals[arc] {
+                let place = on_side(side, sides.len(), if is_along { t } else { 1.0 - t });
+                // Of a triangle the side v = 1 is a point, and the last side is u = 0.
+                let is_along_u = side % 2 == 1 || sides.len() == 3 && side == 2;
+                let [_, su, sv] = self.patch.eval(place[0], place[1]);
+                // Next to a flat corner the derivative is about nothing, and must not count without bound for that.
+                let length = if is_along_u { su } else { sv }.length().max(LEAST * size);
+                planes.push(Tangency { place, is_along_u, normal: normal / length });
+            }
+        }
+        planes
+    }
+
+    /// The largest distance of a sample from the point of the patch that it belongs to.
+    fn error(&self) -> f64 {
+        let pairs = self.samples.points.iter().zip(&self.samples.places);
+        pairs.map(|(&p, &[u, v])| self.patch.point(u, v).distance(p)).fold(0.0, f64::max)
+    }
+
+    /// At how many places of a grid, sides included, the patch looks away from where it looks as a whole.
+    fn folds(&self) -> usize {
+        const PLACES: usize = 13;
+        let at = |k: usize| k as f64 / (PLACES - 1) as f64;
+        let across = |k: usize| {
+            let [_, su, sv] = self.patch.eval(at(k % PLACES), at(k / PLACES));
+            su.cross(sv)
+        };
+        let all: Vec<DVec3> = (0..PLACES * PLACES).map(across).collect();
+        let mean: DVec3 = all.iter().sum();
+        all.iter().filter(|normal| normal.dot(mean) < 0.0).count()
+    }
+
+    fn correct(&mut self) {
+        for (place, &p) in self.samples.places.iter_mut().zip(&self.samples.points) {
+            *place = self.patch.foot(p, *place);
+        }
+    }
+}
+
+/// A patch with these sides, counter-clockwise, its inside a Coons patch of the control points.
+fn with_border(spans: usize, sides: &[Vec<DVec3>]) -> Patch {
+    let n = spans + 3;
+    let is_triangle = sides.len() == 3;
+    let mut patch = Patch { spans: [spans; 2], controls: vec![DVec3::ZERO; n * n], is_triangle, ..Patch::default() };
+    let apex = sides[sides.len() - 1][0];
+    let top = |i: usize| if is_triangle { apex } else { sides[2][n - 1 - i] };
+    let left = |j: usize| sides[sides.len() - 1][n - 1 - j];
+    let (bottom, right) = (|i: usize| sides[0][i], |j: usize| sides[1][j]);
+    for j in 0..n {
+        for i in 0..n {
+            let (u, v) = (i as f64 / (n - 1) as f64, j as f64 / (n - 1) as f64);
+            let ruled = bottom(i) * (1.0 - v) + top(i) * v + left(j) * (1.0 - u) + right(j) * u;
+            let corners = bottom(0).lerp(bottom(n - 1), u) * (1.0 - v) + top(0).lerp(top(n - 1), u) * v;
+            patch.controls[j * n + i] = match (i, j) {
+                (_, 0) => bottom(i),
+                (_, _) if j == n - 1 => top(i),
+                (0, _) => left(j),
+                (_, _) if i == n - 1 => right(j),
+                _ => ruled - corners,
+            };
+        }
+    }
+    patch
+}

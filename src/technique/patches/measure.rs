@@ -1,0 +1,83 @@
+//! What fitted patches are worth: distances between them and the mesh, angles along their seams.
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::fit::Fit;
+use super::frame::Frame;
+use super::sample::{tessellate, triangles};
+use super::{at_seam, normal};
+use crate::mesh::bvh::TriangleBvh;
+use crate::mesh::patches::{Patch, Seam};
+use crate::mesh::{Facet, Soup, Surface};
+use crate::metric::summary::rms;
+
+/// How far each patch and the mesh are apart: largest and root mean square distance, both ways.
+pub(super) struct Distances {
+    surface: TriangleBvh,
+}
+
+impl Distances {
+    pub(super) fn from(surface: &Surface) -> Self {
+        Self { surface: TriangleBvh::of_surface(surface) }
+    }
+
+    /// Of each element: of its vertices from all patches together, and of places of its patch from the mesh. So a patch
+    /// that reaches out over a notch in the border counts as what it is.
+    pub(super) fn of(&self, frame: &Frame<'_>, fits: &[Fit]) -> Vec<(f64, f64)> {
+        /// Elements of the mesh for distances along a side of a patch.
+        const FINE: usize = 16;
+        let patches: Vec<Patch> = fits.iter().map(|fit| fit.patch.clone()).collect();
+        let fine: Soup = tessellate(frame, &patches, FINE);
+        let tree = TriangleBvh::of_surface(&triangles(&fine));
+        let out: Vec<f64> = fine.points.as_slice().par_iter().map(|&p| distance(&self.surface, p)).collect();
+        let facets: Vec<&Facet> = fine.faces.iter().collect();
+        let ground = frame.layout.ground;
+        let of_element = |(e, fit): (usize, &Fit)| {
+            let own = fit.samples.points.iter().zip(&fit.samples.places).map(|(&p, &place)| {
+                let [u, v] = fit.patch.foot(p, place);
+                let own = fit.patch.point(u, v).distance(p);
+                tree.closest_within(p, own * own).map_or(own, |near| near.distance().min(own))
+            });
+            let rim = frame.sides[e].iter().flat_map(|&(arc, _)| &frame.arcs[arc].path);
+            let rim = rim.map(|&v| distance(&tree, ground.point(v)));
+            let back = facets[e * FINE * FINE..(e + 1) * FINE * FINE].iter().flat_map(|f| f.corners());
+            let all: Vec<f64> = own.chain(rim).chain(back.map(|&v| out[v.index()])).collect();
+            (all.iter().copied().fold(0.0, f64::max), rms(&all).unwrap_or(0.0))
+        };
+        fits.par_iter().enumerate().map(of_element).collect()
+    }
+}
+
+fn distance(tree: &TriangleBvh, p: DVec3) -> f64 {
+    tree.closest(p).map_or(0.0, |near| near.distance())
+}
+
+/// For each element the largest angle between planes along its smooth seams; degrees.
+pub(super) fn angles(frame: &Frame<'_>, fits: &[Fit]) -> Vec<f64> {
+    let mut angles = vec![0.0_f64; fits.len()];
+    for seam in seams(frame, fits).into_iter().filter(|seam| seam.is_smooth) {
+        seam.patches.iter().for_each(|&e| angles[e as usize] = angles[e as usize].max(seam.angle));
+    }
+    angles
+}
+
+/// The angle between the tangent planes along each inner arc.
+pub(super) fn seams(frame: &Frame<'_>, fits: &[Fit]) -> Vec<Seam> {
+    /// Places along a seam where the planes are compared; the ends are common to more than two patches.
+    const PLACES: usize = 16;
+    let seam = |arc: usize| {
+        let mut angle = 0.0_f64;
+        let mut pair = None;
+        for k in 1..PLACES {
+            let [a, b] = at_seam(frame, arc, k as f64 / PLACES as f64)?;
+            let normals = [a, b].map(|(e, uv)| normal(&fits[e].patch, uv));
+            // Planes have no sides: at a corner of nearly 180 degrees the order of the derivatives may swap.
+            let between = crate::mesh::geometry::angle(normals[0], normals[1]).to_degrees();
+            angle = angle.max(between.min(180.0 - between));
+            pair = Some([a.0 as u32, b.0 as u32]);
+        }
+        pair.map(|patches| Seam { patches, angle, is_smooth: frame.arcs[arc].is_smooth })
+    };
+    (0..frame.arcs.len()).filter_map(seam).collect()
+}
