@@ -188,7 +188,7 @@ impl<'g> Layout<'g> {
     }
 
     /// The least sine-like quality of the corners that these nodes make on a patch of this normal: 1 for a rectangle
-    /// and for the equilateral triangle, 0 where a corner is straight, negative where it is reflex.
+    /// and for the equilateral triangle, less where it is slender, 0 where a corner is straight, negative where it is reflex.
     pub fn quality(&self, nodes: &[VertexId], normal: DVec3) -> f64 {
         let corners: Vec<DVec3> = nodes.iter().map(|&v| self.ground.point(v)).collect();
         quality(&corners, normal)
@@ -271,6 +271,10 @@ impl<'g> Layout<'g> {
     }
 }
 
+/// Patches longer than so many times their shortest side count less, by the cube of what they exceed it: a row of slender
+/// ones has few irregular nodes, and no use.
+const LONG: f64 = 5.0;
+
 /// See [`Layout::quality`].
 fn quality(corners: &[DVec3], normal: DVec3) -> f64 {
     let n = corners.len();
@@ -280,5 +284,12 @@ fn quality(corners: &[DVec3], normal: DVec3) -> f64 {
         let (to, from) = (corners[(i + 1) % n] - at, corners[(i + n - 1) % n] - at);
         scale * normal.dot(to.normalize_or_zero().cross(from.normalize_or_zero()))
     };
-    (0..n).map(corner).fold(f64::INFINITY, f64::min)
+    let least = (0..n).map(corner).fold(f64::INFINITY, f64::min);
+    let sides = (0..n).map(|i| corners[i].distance(corners[(i + 1) % n]));
+    let (shortest, longest) = sides.fold((f64::INFINITY, 0.0_f64), |(s, l), side| (s.min(side), l.max(side)));
+    if longest > LONG * shortest && least > 0.0 {
+        let slender = LONG * shortest / longest;
+        return least * slender * slender * slender;
+    }
+    least
 }
