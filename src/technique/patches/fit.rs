@@ -7,6 +7,7 @@ use super::frame::Frame;
 use super::solve::{Curve, Samples, fit_inside, fit_tangent};
 use super::tangent::Tangency;
 use super::{FitRules, on_side};
+use crate::mesh::geometry::Aabb;
 use crate::mesh::patches::Patch;
 
 /// An element on its way to a patch.
@@ -35,10 +36,37 @@ impl Fit {
         const ROUNDS: usize = 3;
         self.set_border(frame, element, spans, curves);
         for _ in 0..ROUNDS {
-            fit_inside(&mut self.patch, &self.samples, rules.fairness);
+            self.fill(rules.fairness);
             self.correct();
         }
-        fit_inside(&mut self.patch, &self.samples, rules.fairness);
+        self.fill(rules.fairness);
+    }
+
+    /// Fits the inside. Where vertices crowd in a part of a winding element, they say little of the rest, and the fit may
+    /// swing out into space: then evenness counts more, and at last the inside stays as it was, at first a Coons patch.
+    pub(super) fn fill(&mut self, fairness: f64) {
+        const EVENER: [f64; 4] = [1.0, 30.0, 1e3, 1e6];
+        let before = self.patch.controls.clone();
+        for factor in EVENER {
+            fit_inside(&mut self.patch, &self.samples, factor * fairness);
+            if !self.swings() {
+                return;
+            }
+        }
+        self.patch.controls = before;
+    }
+
+    /// Whether control points lie far outside of the box of the vertices and the border.
+    fn swings(&self) -> bool {
+        /// Of the diagonal of that box.
+        const FAR: f64 = 0.25;
+        let (width, controls) = (self.patch.width(), &self.patch.controls);
+        let height = controls.len() / width;
+        let is_border = |k: usize| k % width == 0 || k % width == width - 1 || k < width || k >= width * (height - 1);
+        let border = controls.iter().enumerate().filter(|&(k, _)| is_border(k)).map(|(_, &p)| p);
+        let bounds = Aabb::of(self.samples.points.iter().copied().chain(border));
+        let room = bounds.grown(FAR * bounds.diagonal());
+        !controls.iter().all(|p| p.cmpge(room.min).all() && p.cmple(room.max).all())
     }
 
     /// Starts from the curves given.
@@ -82,7 +110,7 @@ impl Fit {
         for reach in REACH {
             fit_tangent(&mut self.patch, &self.samples, fairness, (&planes, reach * rules.tolerance));
             self.correct();
-            if self.error() <= rules.tolerance && self.folds() <= folds {
+            if self.error() <= rules.tolerance && self.folds() <= folds && !self.swings() {
                 return;
             }
             (self.patch, self.samples.places) = before.clone();

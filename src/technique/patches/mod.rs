@@ -33,7 +33,7 @@ pub use frame::FrameError;
 use frame::{Frame, covered, frame};
 use measure::{Distances, angles, seams};
 use refine::{Fault, Spans};
-use solve::{Curve, fit_curve, fit_curve_with, fit_inside};
+use solve::{Curve, fit_curve, fit_curve_with};
 use tangent::{end_planes, is_inside};
 
 /// How patches are fitted.
@@ -126,7 +126,7 @@ fn smooth(frame: &Frame<'_>, fits: &mut [Fit], spans: &[usize], curves: &[Curve]
     const ROUNDS: usize = 3;
     fits.par_iter_mut().enumerate().for_each(|(e, fit)| {
         fit.set_border(frame, e, spans[e], curves);
-        fit_inside(&mut fit.patch, &fit.samples, rules.fairness);
+        fit.fill(rules.fairness);
     });
     // Planes are chosen once: later ones would follow what they made.
     let normals: Vec<Vec<(f64, DVec3)>> =
