@@ -62,7 +62,7 @@ impl Fit {
         const FAR: f64 = 0.25;
         let (width, controls) = (self.patch.width(), &self.patch.controls);
         let height = controls.len() / width;
-        let is_border = |k: usize| k % width == 0 || k % width == width - 1 || k < width || k >= width * (height - 1);
+        let is_border = |k: usize| [0, width - 1].contains(&(k % width)) || [0, height - 1].contains(&(k / width));
         let border = controls.iter().enumerate().filter(|&(k, _)| is_border(k)).map(|(_, &p)| p);
         let bounds = Aabb::of(self.samples.points.iter().copied().chain(border));
         let room = bounds.grown(FAR * bounds.diagonal());
