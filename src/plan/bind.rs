@@ -191,16 +191,14 @@ fn check_ranges(table: &Table, schema: &ParameterSchema, context: &mut CaseConte
         let (Some(number), Some(property)) = (entry.value.as_number(), schema.properties.get(key)) else { continue };
         let bound = |name: &str| property.get(name).and_then(Value::as_f64);
         // What is no number lies in no range.
-        let low = bound("minimum")
-            .filter(|limit| number.is_nan() || number < *limit)
-            .map(|limit| format!("at least {limit}"));
-        let high =
-            bound("maximum").filter(|limit| number.is_nan() || number > *limit).map(|limit| format!("at most {limit}"));
-        let above = bound("exclusiveMinimum")
-            .filter(|limit| number.is_nan() || number <= *limit)
-            .map(|limit| format!("greater than {limit}"));
-        let below =
-            bound("exclusiveMaximum").filter(|limit| number >= *limit).map(|limit| format!("less than {limit}"));
+        let broken = |name: &str, is_out: fn(f64, f64) -> bool, words: &str| {
+            let limit = bound(name).filter(|&limit| number.is_nan() || is_out(number, limit))?;
+            Some(format!("{words} {limit}"))
+        };
+        let low = broken("minimum", |number, limit| number < limit, "at least");
+        let high = broken("maximum", |number, limit| number > limit, "at most");
+        let above = broken("exclusiveMinimum", |number, limit| number <= limit, "greater than");
+        let below = broken("exclusiveMaximum", |number, limit| number >= limit, "less than");
         if let Some(range) = low.or(high).or(above).or(below) {
             let message = format!("`{key}` must be {range}, got {number}");
             let problem = Diagnostic::error(entry.value.span, message).help_opt(describe(Some(property)));

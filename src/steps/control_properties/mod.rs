@@ -43,6 +43,7 @@ use crate::technique::collapse::session::{Setup, ToleranceMode, diagonal, open, 
 use crate::technique::collapse::{CollapseRules, Editor, Ending, Goal, Limits, Order, Priority, SizeField, simplify};
 use crate::technique::hierarchy::{Front, extract};
 use crate::technique::levels::{HierarchyReport, Recorded, Source, build};
+use crate::technique::refine::MAX_FACES;
 use crate::technique::remesh::{coarsen, raise_stretch};
 use crate::watch::{Cancelled, Watch};
 
@@ -112,7 +113,7 @@ impl Default for ControlPropertiesParams {
             min_stretch: 0.2,
             mean_stretch: 0.0,
             max_size: None,
-            max_faces: 20_000_000,
+            max_faces: MAX_FACES,
             max_valence: 12,
             target_faces: None,
             feature_weight: 100.0,
