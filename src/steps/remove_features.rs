@@ -3,8 +3,8 @@
 //! # Algorithm
 //! The marks of `features` say where faces end; rings of faces between circles are the sides of holes and bosses. Their
 //! faces go, their rims are filled without new vertices, and each fill is refined and improved alone; see
-//! `technique::defeature`. Fillets at rims and floors need marks at both ends to be seen as part of
-//! a hole: a side that runs on smoothly into other faces is not found.
+//! `technique::defeature`. Bores that cross have no ring of their own: they are found as the openings of flat faces, and
+//! go together. A fillet at a rim needs marks at both ends to be seen as part of a hole.
 //!
 //! Based on: H. Date, S. Kanai, T. Kishinami, I. Nishigaki, T. Dohi. High-Quality and Property Controlled Finite Element
 //! Mesh Generation From Triangular Meshes using the Multiresolution Technique. JCISE 5(4), 2005, section 6.3.2.
@@ -12,7 +12,7 @@
 //! # Invariants
 //! - Faces that belong to no removed feature, and the vertices of rims, stay as they are.
 //! - The surface stays an oriented manifold without new self-intersections; a through hole raises the Euler
-//!   characteristic by 2, a blind hole or a boss leaves it.
+//!   characteristic by 2, a blind hole or a boss leaves it, crossing bores with `n` openings raise it by `2 n - 2`.
 //! - A flat rim gets a flat fill.
 //!
 //! # Cost
@@ -38,7 +38,8 @@ const LISTED: usize = 500;
 /// Removes through holes, blind holes and bosses below a diameter, and fills their place.
 ///
 /// Use it after `features`, whose marks it needs: without marks it finds nothing. Chamfers, countersinks and
-/// counterbores go with their hole; slots and other openings that are not round stay.
+/// counterbores go with their hole, and bores that cross go together; slots and other openings that are not round stay.
+/// What stays is listed with its place and the reason.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct RemoveFeaturesParams {
@@ -67,6 +68,8 @@ pub struct RemovedFeature {
     pub axis: [f64; 3],
     /// The diameter of its widest side, in mesh units.
     pub diameter: f64,
+    /// Bores that it consisted of: several where they crossed, which go together.
+    pub bores: usize,
     /// Faces taken out.
     pub faces_removed: usize,
     /// Faces of its fills.
@@ -79,7 +82,8 @@ pub struct RemovedFeature {
 pub struct RejectedFeature {
     /// The middle of its rims.
     pub centre: [f64; 3],
-    /// The largest diameter of its rims, or of the circles nearest to them, in mesh units.
+    /// The largest diameter of its rims, or of the circles nearest to them, in mesh units; the narrowest width of an
+    /// opening that is nowhere near round.
     pub diameter: f64,
     /// Why it stays.
     pub reason: Reason,
@@ -160,7 +164,7 @@ pub fn remove_features(
         return Err(RemoveFeaturesError::BadDiameter(most));
     }
     let (result, report) = defeature::remove_features(surface, most, &params.kinds, &locks.rules(), watch)?;
-    let count = |kind: Kind| report.removed.iter().filter(|r| r.kind == kind).count();
+    let count = |kind: Kind| report.removed.iter().filter(|r| r.kind == kind).map(|r| r.bores).sum();
     let sum: f64 = result.faces.ids().map(|f| stretch(result.corners(f))).sum();
     let stats = RemoveFeaturesStats {
         faces_before: surface.faces.len(),
@@ -168,7 +172,7 @@ pub fn remove_features(
         through_holes: count(Kind::ThroughHoles),
         blind_holes: count(Kind::BlindHoles),
         bosses: count(Kind::Bosses),
-        refused: report.rejected.iter().filter(|r| r.reason != Reason::TooLarge).count(),
+        refused: report.rejected.iter().filter(|r| !r.reason.is_size()).count(),
         removed: report.removed.iter().take(LISTED).map(removed).collect(),
         rejected: report.rejected.iter().take(LISTED).map(rejected).collect(),
         mean_stretch: sum / result.faces.len().max(1) as f64,
@@ -182,6 +186,7 @@ fn removed(feature: &Removed) -> RemovedFeature {
         centre: feature.centre.to_array(),
         axis: feature.axis.to_array(),
         diameter: feature.diameter,
+        bores: feature.bores,
         faces_removed: feature.faces_removed,
         faces_added: feature.faces_added,
     }
@@ -197,7 +202,7 @@ pub struct Step;
 
 impl StepContract for Step {
     const NAME: &'static str = "remove-features";
-    const REVISION: u32 = 8;
+    const REVISION: u32 = 9;
     const INPUTS: &'static [InputDef] = &[InputDef {
         name: "from",
         accepts: &[Port::Surface],

@@ -4,22 +4,24 @@
 //! over further sides, over chamfers and countersinks, over a step when another side follows it, and it ends at a floor
 //! or at a rim of the surface that stays.
 
+use glam::DVec3;
+
 use super::patches::Patches;
 use super::round::{Facing, Form, Ring, ring};
 use super::{Kind, Reason, Rejected};
-use crate::mesh::Surface;
+use crate::mesh::{FaceId, Surface, VertexId};
 
 /// Largest distance of a rim from its circle, as a share of the radius: the sagitta of a chord of 36 degrees.
-const ROUND: f64 = 0.05;
+pub(super) const ROUND: f64 = 0.05;
 /// Axes of one feature differ by less than 8 degrees, and lie closer than this share of the radius.
-const PARALLEL: f64 = 0.99;
-const CONCENTRIC: f64 = 0.05;
+pub(super) const PARALLEL: f64 = 0.99;
+pub(super) const CONCENTRIC: f64 = 0.05;
 /// A chamfer or countersink is at most this much wider than its hole.
 const WIDEST_CONE: f64 = 2.0;
 /// A side up to this much wider than its hole is a step of it; a wider one is a pocket with a hole in its floor.
-const WIDEST_STEP: f64 = 3.0;
+pub(super) const WIDEST_STEP: f64 = 3.0;
 /// A floor lies within this much of its rim's radius.
-const WIDEST_FLOOR: f64 = 1.1;
+pub(super) const WIDEST_FLOOR: f64 = 1.1;
 
 /// A feature that may be removed.
 #[derive(Clone, Debug)]
@@ -30,8 +32,18 @@ pub(super) struct Cavity {
     /// Rims that are to be filled: patch and number of its rim.
     pub(super) rims: Vec<(u32, usize)>,
     /// What the statistics say of it.
-    pub(super) ring: Ring,
+    pub(super) axis: DVec3,
     pub(super) diameter: f64,
+    /// The bores that it consists of, by place and diameter: several where they cross.
+    pub(super) bores: Vec<(DVec3, f64)>,
+}
+
+/// What a search came upon.
+#[derive(Debug, Default)]
+pub(super) struct Found {
+    pub(super) cavities: Vec<Cavity>,
+    /// What stays, with faces of it by which another search tells that it is known.
+    pub(super) rejected: Vec<(Vec<FaceId>, Rejected)>,
 }
 
 /// Where a chain ends.
@@ -42,6 +54,15 @@ enum End {
     Floor,
     /// Nowhere: the feature has a step that is too wide to be removed.
     TooWide,
+}
+
+/// What a chain makes of a side.
+enum Growth {
+    Cavity(Cavity),
+    /// A feature with a step that is too wide.
+    TooWide,
+    /// Nothing to be removed: a whole pin, a column between two faces.
+    Nothing,
 }
 
 /// Looks for features on the patches of a surface.
@@ -60,9 +81,9 @@ impl<'a> Finder<'a> {
     }
 
     /// The features of the wanted kinds, each patch in one at most, and what looked like one but is none.
-    pub(super) fn find(&self, kinds: &[Kind]) -> (Vec<Cavity>, Vec<Rejected>) {
+    pub(super) fn find(&self, kinds: &[Kind]) -> Found {
         let mut used = vec![false; self.rings.len()];
-        let (mut cavities, mut rejected) = (Vec::new(), Vec::new());
+        let mut found = Found::default();
         for number in 0..self.rings.len() {
             let Some(ring) = self.rings[number].as_ref().filter(|ring| ring.form == Form::Side) else { continue };
             let wanted = match ring.facing {
@@ -73,19 +94,30 @@ impl<'a> Finder<'a> {
             if !wanted || used[number] {
                 continue;
             }
-            if let Some(reason) = self.refusal(number, ring) {
-                rejected.push(Rejected { centre: ring.centre, diameter: ring.diameter(), reason });
-                continue;
-            }
-            let Some(cavity) = self.grow(number as u32, ring) else { continue };
-            if kinds.contains(&cavity.kind) && !cavity.patches.iter().any(|&p| used[p as usize]) {
-                for &p in &cavity.patches {
-                    used[p as usize] = true;
+            let growth = match self.refusal(number, ring) {
+                Some(reason) => Err(reason),
+                None => match self.grow(number as u32, ring) {
+                    Growth::Cavity(cavity) => Ok(cavity),
+                    Growth::TooWide => Err(Reason::StepTooLarge),
+                    Growth::Nothing => continue,
+                },
+            };
+            match growth {
+                Err(reason) => {
+                    let rejected = Rejected { centre: ring.centre, diameter: ring.diameter(), reason };
+                    found.rejected.push((self.patches.all[number].faces.clone(), rejected));
                 }
-                cavities.push(cavity);
+                Ok(cavity) => {
+                    if kinds.contains(&cavity.kind) && !cavity.patches.iter().any(|&p| used[p as usize]) {
+                        for &p in &cavity.patches {
+                            used[p as usize] = true;
+                        }
+                        found.cavities.push(cavity);
+                    }
+                }
             }
         }
-        (cavities, rejected)
+        found
     }
 
     /// Why a side does not begin a feature.
@@ -104,25 +136,26 @@ impl<'a> Finder<'a> {
     }
 
     /// The chain through a side.
-    fn grow(&self, seed: u32, ring: &Ring) -> Option<Cavity> {
+    fn grow(&self, seed: u32, ring: &Ring) -> Growth {
         let mut patches = vec![seed];
         let mut rims: Vec<(u32, usize)> = Vec::new();
         for rim in [0, 1] {
             match self.extend(seed, rim, ring, &mut patches) {
                 End::Base(patch, rim) => rims.push((patch, rim)),
                 End::Floor => {}
-                End::TooWide => return None,
+                End::TooWide => return Growth::TooWide,
             }
         }
         let kind = match (ring.facing, rims.len()) {
             (Facing::In, 2) => Kind::ThroughHoles,
             (Facing::In, 1) => Kind::BlindHoles,
             (Facing::Out, 1) => Kind::Bosses,
-            _ => return None,
+            _ => return Growth::Nothing,
         };
         let sides = patches.iter().filter_map(|&p| self.rings[p as usize].as_ref()).filter(|r| r.form == Form::Side);
         let diameter = sides.map(Ring::diameter).fold(0.0, f64::max);
-        Some(Cavity { kind, patches, rims, ring: ring.clone(), diameter })
+        let bores = vec![(ring.centre, diameter)];
+        Growth::Cavity(Cavity { kind, patches, rims, axis: ring.axis, diameter, bores })
     }
 
     /// Goes on over a rim as long as the feature does.
@@ -185,7 +218,7 @@ impl<'a> Finder<'a> {
         if all.rims.len() != 1 || all.characteristic != 1 {
             return false;
         }
-        let aside = |v: &crate::mesh::VertexId| {
+        let aside = |v: &VertexId| {
             let off = self.surface.points[*v] - seed.centre;
             (off - seed.axis * off.dot(seed.axis)).length()
         };

@@ -7,6 +7,10 @@
 //! feature is left alone if a lock holds any of its vertices or if its fill would meet something. After a round the
 //! marks of vanished rims are gone, so that a boss with a hole is a boss in the next one.
 //!
+//! When no ring between marks is left, edges that are sharp without a mark cut as well, because marks leave gaps where
+//! rims nearly touch; then what lies behind the openings of flat faces is looked at as a whole (see `compound`), which
+//! finds bores that cross. What stays is listed once, by the first search that came upon it.
+//!
 //! Based on: H. Date, S. Kanai, T. Kishinami, I. Nishigaki, T. Dohi. *High-Quality and Property Controlled Finite Element
 //! Mesh Generation From Triangular Meshes using the Multiresolution Technique*, JCISE 5(4), 2005, section 6.3.2.
 //! Departure: the paper refines a fill to the mean size of the mesh; where the edges of its rim are shorter, we refine to
@@ -20,31 +24,33 @@
 //! O(F log F) a round, and O(n³) for a rim of n ≤ 500 edges.
 
 mod cavity;
+mod compound;
 mod fill;
+mod open_side;
+mod openings;
 mod patches;
 mod rebuild;
 mod round;
+mod surgery;
 #[cfg(test)]
 mod tests;
 
-use std::collections::BTreeSet;
-
 use glam::DVec3;
-use rustc_hash::FxHashSet;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::mesh::bvh::TriangleBvh;
 use crate::mesh::geometry::triangle_size;
-use crate::mesh::id::{Face, Vertex};
-use crate::mesh::topology::VertexFaces;
-use crate::mesh::{EdgeKey, FaceId, Freedom, FreedomError, IdVec, LockRules, MarkCause, Rim, Surface, VertexId};
-use crate::mesh::{edge_key, resolve_freedom};
+use crate::mesh::id::Face;
+use crate::mesh::topology::EdgeTable;
+use crate::mesh::{FaceId, FreedomError, IdVec, LockRules, Surface};
+use crate::technique::feature::reliable_normals;
 use crate::watch::{Cancelled, Watch};
-use cavity::{Cavity, Finder};
-use fill::Fill;
+use cavity::{Finder, Found};
+use compound::Compounds;
+use open_side::open_sided;
 use patches::Patches;
 use rebuild::rebuild;
+use surgery::Surgery;
 
 /// Rounds at most: each removes what the round before has laid open.
 const MOST_ROUNDS: usize = 8;
@@ -67,10 +73,14 @@ pub enum Kind {
 pub enum Reason {
     /// Its diameter is above the limit.
     TooLarge,
-    /// A rim is no circle: a slot, an ellipse.
+    /// One of its steps is above the limit.
+    StepTooLarge,
+    /// A rim is no circle: a slot, an ellipse, bores that overlap.
     NotRound,
-    /// Other features open into its side.
+    /// Other features, or the outside, open into its side.
     CutByOthers,
+    /// It opens into something above the limit, or is wider inside than at its rims.
+    OpensWider,
     /// It lies on the border of an open surface.
     OpenRim,
     /// A lock or a seam holds it.
@@ -79,6 +89,30 @@ pub enum Reason {
     NoFill,
     /// Its fill would meet the surface.
     Obstructed,
+}
+
+impl Reason {
+    /// Whether the size alone is the reason.
+    pub fn is_size(self) -> bool {
+        match self {
+            Self::TooLarge | Self::StepTooLarge => true,
+            Self::NotRound
+            | Self::CutByOthers
+            | Self::OpensWider
+            | Self::OpenRim
+            | Self::Locked
+            | Self::NoFill
+            | Self::Obstructed => false,
+        }
+    }
+
+    /// Whether the feature is not to be tried again as a part of another one.
+    fn is_final(self) -> bool {
+        match self {
+            Self::StepTooLarge | Self::Locked | Self::NoFill | Self::Obstructed => true,
+            Self::TooLarge | Self::NotRound | Self::CutByOthers | Self::OpensWider | Self::OpenRim => false,
+        }
+    }
 }
 
 /// A feature that was removed.
@@ -92,6 +126,8 @@ pub struct Removed {
     pub axis: DVec3,
     /// The diameter of its widest side.
     pub diameter: f64,
+    /// Bores that it consisted of: several where they crossed.
+    pub bores: usize,
     /// Faces taken out.
     pub faces_removed: usize,
     /// Faces of its fills.
@@ -103,7 +139,8 @@ pub struct Removed {
 pub struct Rejected {
     /// The middle of its rims' centres.
     pub centre: DVec3,
-    /// The largest diameter of its rims, or of the circles nearest to them.
+    /// The largest diameter of its rims, or of the circles nearest to them; the narrowest width of an opening that is
+    /// nowhere near round.
     pub diameter: f64,
     /// Why it stays.
     pub reason: Reason,
@@ -141,151 +178,115 @@ pub fn remove_features(
     watch: &Watch,
 ) -> Result<(Surface, Report), DefeatureError> {
     let sizes: f64 = surface.faces.ids().map(|f| triangle_size(surface.corners(f))).sum();
-    let mean_size = sizes / surface.faces.len().max(1) as f64;
+    let wishes = Wishes { most, kinds, mean_size: sizes / surface.faces.len().max(1) as f64, locks };
     let mut report = Report::default();
     let mut current = surface.clone();
     for _ in 0..MOST_ROUNDS {
         watch.check()?;
-        let patches = Patches::new(&current);
-        let (cavities, rejected) = Finder::new(&current, &patches, most).find(kinds);
-        report.rejected = rejected;
-        if cavities.is_empty() {
-            break;
-        }
-        let before = report.removed.len();
-        let mut surgery = Surgery::new(&current, &patches, locks)?;
-        watch.phase("removing features", Some(cavities.len() as u64));
-        for (i, cavity) in cavities.iter().enumerate() {
-            watch.check()?;
-            match surgery.remove(cavity, mean_size, watch)? {
-                Ok(removed) => report.removed.push(removed),
-                Err(reason) => {
-                    let (centre, diameter) = (cavity.ring.centre, cavity.diameter);
-                    report.rejected.push(Rejected { centre, diameter, reason });
-                }
-            }
-            watch.advance(i as u64 + 1, || format!("{} removed", report.removed.len()));
-        }
-        if report.removed.len() == before {
-            break;
-        }
-        current = rebuild(&current, &surgery.goes, &surgery.fills, &surgery.tree);
+        report.rejected.clear();
+        let known = IdVec::filled(None, current.faces.len());
+        let mut round = Round { surface: &current, wishes, known, report: &mut report };
+        let Some(next) = round.run(watch)? else { break };
+        current = next;
     }
     Ok((current, report))
 }
 
-/// One round on one surface.
-struct Surgery<'a> {
+/// What is asked for.
+#[derive(Clone, Copy)]
+struct Wishes<'a> {
+    most: f64,
+    kinds: &'a [Kind],
+    /// The mean size of the surface's faces.
+    mean_size: f64,
+    locks: &'a LockRules<'a>,
+}
+
+/// One search and what it removes.
+struct Round<'a> {
     surface: &'a Surface,
-    patches: &'a Patches,
-    fans: VertexFaces,
-    tree: TriangleBvh,
-    freedom: IdVec<Vertex, Freedom>,
-    goes: IdVec<Face, bool>,
-    fills: Vec<Fill>,
-    /// The triangles of all fills.
-    filled: Vec<[DVec3; 3]>,
-    /// Their edges between rim vertices.
-    taken: BTreeSet<EdgeKey>,
+    wishes: Wishes<'a>,
+    /// Why the feature stays that a face is known to belong to.
+    known: IdVec<Face, Option<Reason>>,
+    report: &'a mut Report,
 }
 
-impl<'a> Surgery<'a> {
-    fn new(surface: &'a Surface, patches: &'a Patches, locks: &LockRules<'_>) -> Result<Self, FreedomError> {
-        Ok(Self {
-            surface,
-            patches,
-            fans: VertexFaces::new(surface),
-            tree: TriangleBvh::of_surface(surface),
-            freedom: locked(surface, locks)?,
-            goes: IdVec::filled(false, surface.faces.len()),
-            fills: Vec::new(),
-            filled: Vec::new(),
-            taken: BTreeSet::new(),
-        })
+impl Round<'_> {
+    /// The surface without what was found first: by marks; by sharp edges, where marks have gaps; behind openings.
+    fn run(&mut self, watch: &Watch) -> Result<Option<Surface>, DefeatureError> {
+        let Wishes { most, kinds, .. } = self.wishes;
+        let edges = EdgeTable::new(self.surface);
+        let marked = patches::marked(self.surface, &edges);
+        let patches = Patches::new(self.surface, &edges, &marked);
+        let found = Finder::new(self.surface, &patches, most).find(kinds);
+        if let Some(next) = self.operate(&patches, found, watch)? {
+            return Ok(Some(next));
+        }
+        let normals = reliable_normals(self.surface, &edges);
+        let Some(sharp) = patches::sharp(self.surface, &edges, &normals) else { return Ok(None) };
+        watch.check()?;
+        let patches = Patches::new(self.surface, &edges, &sharp);
+        if sharp != marked {
+            let found = Finder::new(self.surface, &patches, most).find(kinds);
+            if let Some(next) = self.operate(&patches, found, watch)? {
+                return Ok(Some(next));
+            }
+        }
+        let compounds = Compounds::new(self.surface, &edges, &normals, &patches, most);
+        let next = self.operate(&compounds.pieces, compounds.find(kinds), watch)?;
+        if next.is_none() && (kinds.contains(&Kind::ThroughHoles) || kinds.contains(&Kind::BlindHoles)) {
+            for (faces, rejected) in open_sided(self.surface, &patches, most) {
+                self.reject(&faces, vec![rejected]);
+            }
+        }
+        Ok(next)
     }
 
-    fn remove(&mut self, cavity: &Cavity, mean_size: f64, watch: &Watch) -> Result<Result<Removed, Reason>, Cancelled> {
-        let faces: Vec<FaceId> =
-            cavity.patches.iter().flat_map(|&p| &self.patches.all[p as usize].faces).copied().collect();
-        let is_held = |v: &VertexId| self.freedom[*v] != Freedom::Free;
-        if faces.iter().flat_map(|&f| &self.surface.faces[f]).any(is_held) {
-            return Ok(Err(Reason::Locked));
+    /// Notes what stays and removes the rest; `None` where nothing could be removed.
+    fn operate(&mut self, patches: &Patches, found: Found, watch: &Watch) -> Result<Option<Surface>, DefeatureError> {
+        for (faces, rejected) in found.rejected {
+            self.reject(&faces, vec![rejected]);
         }
-        let goes: FxHashSet<FaceId> = faces.iter().copied().collect();
-        let mut fills: Vec<Fill> = Vec::new();
-        for &(patch, rim) in &cavity.rims {
-            let Some(coarse) = self.coarse(patch, rim, &goes, &fills) else { return Ok(Err(Reason::NoFill)) };
-            let others: Vec<[DVec3; 3]> =
-                fills.iter().flat_map(|f| f.corners(self.surface)).chain(self.filled.iter().copied()).collect();
-            let stays = |f: FaceId| !self.goes[f] && !goes.contains(&f);
-            let is_harmless = |fill: &Fill| !fill.meets(self.surface, &self.tree, stays, &others);
-            let fine = coarse.improved(self.surface, mean_size, watch)?;
-            let Some(fill) = fine.into_iter().chain([coarse]).find(is_harmless) else {
-                return Ok(Err(Reason::Obstructed));
+        if found.cavities.is_empty() {
+            return Ok(None);
+        }
+        let before = self.report.removed.len();
+        let mut surgery = Surgery::new(self.surface, patches, self.wishes.locks)?;
+        watch.phase("removing features", Some(found.cavities.len() as u64));
+        for (i, cavity) in found.cavities.iter().enumerate() {
+            watch.check()?;
+            let faces: Vec<FaceId> =
+                cavity.patches.iter().flat_map(|&p| &patches.all[p as usize].faces).copied().collect();
+            let why = |reason: Reason| {
+                let of = |&(centre, diameter): &(DVec3, f64)| Rejected { centre, diameter, reason };
+                cavity.bores.iter().map(of).collect::<Vec<_>>()
             };
-            fills.push(fill);
+            if faces.iter().any(|&f| self.known[f].is_some_and(Reason::is_final)) {
+                if cavity.bores.len() > 1 {
+                    let rest: Vec<FaceId> = faces.into_iter().filter(|&f| self.known[f].is_none()).collect();
+                    self.reject(&rest, why(Reason::CutByOthers));
+                }
+                continue;
+            }
+            match surgery.remove(cavity, self.wishes.mean_size, watch)? {
+                Ok(removed) => self.report.removed.push(removed),
+                Err(reason) => self.reject(&faces, why(reason)),
+            }
+            watch.advance(i as u64 + 1, || format!("{} removed", self.report.removed.len()));
         }
-        let rims = cavity.rims.iter().map(|&(p, rim)| self.centre(p, rim)).sum::<DVec3>();
-        let axis = cavity.ring.axis;
-        let turned = if axis[axis.abs().max_position()] < 0.0 { -axis } else { axis };
-        let removed = Removed {
-            kind: cavity.kind,
-            centre: rims / cavity.rims.len().max(1) as f64,
-            axis: turned,
-            diameter: cavity.diameter,
-            faces_removed: faces.len(),
-            faces_added: fills.iter().map(|fill| fill.triangles.len()).sum(),
-        };
-        for f in faces {
-            self.goes[f] = true;
-        }
-        for fill in fills {
-            self.filled.extend(fill.corners(self.surface));
-            self.taken.extend(fill.rim_edges());
-            self.fills.push(fill);
-        }
-        Ok(Ok(removed))
+        let is_any = self.report.removed.len() > before;
+        Ok(is_any.then(|| rebuild(self.surface, &surgery.goes, &surgery.fills, &surgery.tree)))
     }
 
-    /// The mean of a rim's vertices.
-    fn centre(&self, patch: u32, rim: usize) -> DVec3 {
-        let rim = &self.patches.all[patch as usize].rims[rim].vertices;
-        rim.iter().map(|&v| self.surface.points[v]).sum::<DVec3>() / rim.len().max(1) as f64
-    }
-
-    fn coarse(&self, patch: u32, rim: usize, goes: &FxHashSet<FaceId>, before: &[Fill]) -> Option<Fill> {
-        let rim = &self.patches.all[patch as usize].rims[rim];
-        let mut vertices = rim.vertices.clone();
-        vertices.reverse();
-        // Edge `i` of the turned rim is the edge that ended in its first vertex.
-        let mut beside: Vec<FaceId> = rim.beyond.iter().copied().collect::<Option<_>>()?;
-        beside.reverse();
-        beside.rotate_left(1);
-        if beside.iter().any(|f| goes.contains(f)) {
-            return None;
+    /// Lists the bores of a feature that stays, unless it is listed already.
+    fn reject(&mut self, faces: &[FaceId], bores: Vec<Rejected>) {
+        let Some(reason) = bores.first().map(|bore| bore.reason) else { return };
+        let is_new = !faces.is_empty() && faces.iter().all(|&f| self.known[f].is_none());
+        for &f in faces {
+            self.known[f].get_or_insert(reason);
         }
-        let mut taken: FxHashSet<EdgeKey> = self.taken.iter().copied().collect();
-        taken.extend(before.iter().flat_map(Fill::rim_edges));
-        for f in vertices.iter().flat_map(|&v| self.fans.of(v)).filter(|f| !goes.contains(f)) {
-            let [a, b, c] = self.surface.faces[*f];
-            taken.extend([edge_key(a, b), edge_key(b, c), edge_key(c, a)]);
+        if is_new {
+            self.report.rejected.extend(bores);
         }
-        Fill::coarse(self.surface, vertices, beside, &taken)
     }
-}
-
-/// What locks, seams and locked marks hold, without the marks of features.
-fn locked(surface: &Surface, locks: &LockRules<'_>) -> Result<IdVec<Vertex, Freedom>, FreedomError> {
-    let is_ours = |cause: MarkCause| match cause {
-        MarkCause::Boundary | MarkCause::Feature | MarkCause::RegionBorder => true,
-        MarkCause::Seam | MarkCause::Locked => false,
-    };
-    let mut bare = surface.clone();
-    let carried = &mut bare.carried;
-    let marks = &surface.carried.marks;
-    let ours: BTreeSet<VertexId> =
-        marks.iter().filter(|(_, mark)| is_ours(mark.cause)).flat_map(|(edge, _)| *edge).collect();
-    carried.marks.retain(|_, mark| !is_ours(mark.cause));
-    carried.pins.retain(|v, _| !ours.contains(v));
-    Ok(resolve_freedom(&bare, &LockRules { rim: Rim::Free, ..*locks })?.vertices)
 }

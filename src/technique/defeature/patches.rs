@@ -1,21 +1,51 @@
 //! The pieces into which marked edges cut a surface, with their rims.
+//!
+//! Marks have gaps where curves run so close to each other that only one of them is kept; there the angle between faces
+//! shows where the other one runs.
 
+use glam::DVec3;
 use rustc_hash::FxHashMap;
 
-use crate::mesh::id::Face;
-use crate::mesh::topology::EdgeTable;
-use crate::mesh::{FaceId, IdVec, Surface, VertexId};
+use crate::mesh::geometry::angle;
+use crate::mesh::id::{Edge, Face};
+use crate::mesh::topology::{EdgeTable, SideRef};
+use crate::mesh::{EdgeId, EdgeKey, FaceId, IdVec, MarkCause, Surface, VertexId};
+
+/// An unmarked edge is sharp from this angle between the normals on, in degrees: what marks are given for by default.
+const SHARP: f64 = 30.0;
+
+/// The marked edges.
+pub(super) fn marked(surface: &Surface, edges: &EdgeTable) -> IdVec<Edge, bool> {
+    edges.keys().iter().map(|key| surface.carried.marks.contains_key(key)).collect()
+}
+
+/// The edges marked as sharp and all that are so without a mark; `None` on a surface without such marks, which nobody has
+/// searched for them.
+pub(super) fn sharp(surface: &Surface, edges: &EdgeTable, normals: &IdVec<Face, DVec3>) -> Option<IdVec<Edge, bool>> {
+    let marks = &surface.carried.marks;
+    let is_marked = |key: &EdgeKey| marks.get(key).is_some_and(|mark| mark.cause == MarkCause::Feature);
+    if !edges.keys().iter().any(is_marked) {
+        return None;
+    }
+    let is_sharp = |sides: &[SideRef]| match sides {
+        [a, b] => angle(normals[a.face], normals[b.face]).to_degrees() >= SHARP,
+        _ => true,
+    };
+    Some(edges.iter().map(|(_, key, sides)| is_marked(&key) || is_sharp(sides)).collect())
+}
 
 /// One closed chain of edges round a patch.
 #[derive(Clone, Debug)]
 pub(super) struct Rim {
     /// Its vertices in the direction of the patch's faces; edge `i` goes from vertex `i` to the next one.
     pub(super) vertices: Vec<VertexId>,
+    /// The patch's face at each edge.
+    pub(super) own: Vec<FaceId>,
     /// The face beyond each edge; `None` on the border of an open surface.
     pub(super) beyond: Vec<Option<FaceId>>,
 }
 
-/// Connected faces with no marked edge between them.
+/// Connected faces with no cut between them.
 #[derive(Clone, Debug)]
 pub(super) struct Patch {
     pub(super) faces: Vec<FaceId>,
@@ -33,11 +63,9 @@ pub(super) struct Patches {
 }
 
 impl Patches {
-    /// Cuts the surface along its marked edges.
-    pub(super) fn new(surface: &Surface) -> Self {
-        let edges = EdgeTable::new(surface);
+    /// Cuts the surface along some of its edges.
+    pub(super) fn new(surface: &Surface, edges: &EdgeTable, is_cut: &IdVec<Edge, bool>) -> Self {
         let sides = edges.edges_of_triangles(surface.faces.len());
-        let is_marked: Vec<bool> = edges.keys().iter().map(|key| surface.carried.marks.contains_key(key)).collect();
         let mut of_face = IdVec::<Face, u32>::filled(u32::MAX, surface.faces.len());
         let mut all: Vec<Patch> = Vec::new();
         for first in surface.faces.ids() {
@@ -50,7 +78,7 @@ impl Patches {
             let mut at = 0;
             while let Some(&f) = faces.get(at) {
                 at += 1;
-                for e in sides[f].into_iter().filter(|e| !is_marked[e.index()]) {
+                for e in sides[f].into_iter().filter(|e| !is_cut[*e]) {
                     for side in edges.sides(e) {
                         if of_face[side.face] == u32::MAX {
                             of_face[side.face] = number;
@@ -64,20 +92,14 @@ impl Patches {
         }
         let mut this = Self { of_face, all };
         for number in 0..this.all.len() {
-            this.find_rims(surface, &edges, &sides, number);
+            this.find_rims(surface, edges, &sides, number);
         }
         this
     }
 
-    fn find_rims(
-        &mut self,
-        surface: &Surface,
-        edges: &EdgeTable,
-        sides: &IdVec<Face, [crate::mesh::EdgeId; 3]>,
-        number: usize,
-    ) {
+    fn find_rims(&mut self, surface: &Surface, edges: &EdgeTable, sides: &IdVec<Face, [EdgeId; 3]>, number: usize) {
         let faces = &self.all[number].faces;
-        let mut out: Vec<(VertexId, VertexId, Option<FaceId>)> = Vec::new();
+        let mut out: Vec<Side> = Vec::new();
         let mut vertices: Vec<VertexId> = Vec::with_capacity(3 * faces.len());
         let (mut inner, mut is_pinched) = (0_usize, false);
         for &f in faces {
@@ -88,7 +110,7 @@ impl Patches {
                 if beyond.is_some_and(|g| self.of_face[g] == number as u32) {
                     inner += 1;
                 } else {
-                    out.push((corners[k], corners[(k + 1) % 3], beyond));
+                    out.push((corners[k], corners[(k + 1) % 3], f, beyond));
                 }
             }
         }
@@ -114,17 +136,21 @@ impl Patches {
     }
 }
 
+/// A directed edge of a patch's border, the patch's face at it and the one beyond.
+type Side = (VertexId, VertexId, FaceId, Option<FaceId>);
+
 /// Closed chains out of directed edges, at most one of which leaves a vertex.
-fn chains(out: &[(VertexId, VertexId, Option<FaceId>)]) -> Vec<Rim> {
+fn chains(out: &[Side]) -> Vec<Rim> {
     let next: FxHashMap<VertexId, usize> = out.iter().enumerate().map(|(i, side)| (side.0, i)).collect();
     let mut used = vec![false; out.len()];
     let mut rims = Vec::new();
     for first in 0..out.len() {
-        let mut rim = Rim { vertices: Vec::new(), beyond: Vec::new() };
+        let mut rim = Rim { vertices: Vec::new(), own: Vec::new(), beyond: Vec::new() };
         let mut at = first;
         while !std::mem::replace(&mut used[at], true) {
             rim.vertices.push(out[at].0);
-            rim.beyond.push(out[at].2);
+            rim.own.push(out[at].2);
+            rim.beyond.push(out[at].3);
             let Some(&following) = next.get(&out[at].1) else { break };
             at = following;
         }

@@ -128,8 +128,21 @@ pub(super) fn ring(surface: &Surface, patch: &Patch) -> Option<Ring> {
     Some(Ring { axis, centre, circles, form, facing })
 }
 
+/// How much nearer to the centre the nearest middle of a rim's edges is than its farthest vertex, as a share of that
+/// distance: tells a polygon from a circle, whether or not its sides are divided.
+pub(super) fn unroundness(surface: &Surface, rim: &Rim, centre: DVec3, axis: DVec3) -> f64 {
+    let at = |i: usize| surface.points[rim.vertices[i % rim.vertices.len()]];
+    let aside = |p: DVec3| (p - centre - axis * (p - centre).dot(axis)).length();
+    let (mut least, mut most) = (f64::INFINITY, 0.0_f64);
+    for i in 0..rim.vertices.len() {
+        least = least.min(aside(at(i))).min(aside(0.5 * (at(i) + at(i + 1))));
+        most = most.max(aside(at(i)));
+    }
+    if most > 0.0 { 1.0 - least / most } else { f64::INFINITY }
+}
+
 /// The circle nearest to a rim seen along the axis (Kåsa's linear least squares).
-fn circle(surface: &Surface, rim: &Rim, axis: DVec3) -> Circle {
+pub(super) fn circle(surface: &Surface, rim: &Rim, axis: DVec3) -> Circle {
     let (u, v) = axis.any_orthonormal_pair();
     let points: Vec<DVec3> = rim.vertices.iter().map(|&w| surface.points[w]).collect();
     let count = points.len() as f64;

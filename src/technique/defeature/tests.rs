@@ -77,17 +77,20 @@ impl Builder {
     }
 
     /// The border of a square of side 2, `N` points in the order of angles.
-    fn square(&mut self, x: f64, z: f64) -> Vec<u32> {
+    fn square_of(at: impl Fn(f64, f64) -> [f64; 3]) -> Vec<[f64; 3]> {
         let side = N / 4;
-        (0..N)
-            .map(|i| {
-                // Begins at angle 0, in the middle of the right side.
-                let k = (i + side / 2) % N;
-                let t = 2.0 * (k % side) as f64 / side as f64 - 1.0;
-                let (u, v) = [(1.0, t), (-t, 1.0), (-1.0, -t), (t, -1.0)][k / side];
-                self.point([x + u, v, z])
-            })
-            .collect()
+        let place = |i: usize| {
+            // Begins at angle 0, in the middle of the right side.
+            let k = (i + side / 2) % N;
+            let t = 2.0 * (k % side) as f64 / side as f64 - 1.0;
+            let (u, v) = [(1.0, t), (-t, 1.0), (-1.0, -t), (t, -1.0)][k / side];
+            at(u, v)
+        };
+        (0..N).map(place).collect()
+    }
+
+    fn square(&mut self, x: f64, z: f64) -> Vec<u32> {
+        Self::square_of(|u, v| [x + u, v, z]).iter().map(|&p| self.point(p)).collect()
     }
 }
 
@@ -121,6 +124,44 @@ fn plate(cells: &[Cell]) -> Surface {
     surface(&b.points, &b.faces)
 }
 
+/// A block of side 2 with a bore from the top's middle that turns, with a mitre, and leaves through the right side.
+fn elbow(radius: f64) -> Surface {
+    let mut b = Builder { points: Vec::new(), faces: Vec::new() };
+    let mut circles = Vec::new();
+    for axis in 0..3 {
+        for sign in [1.0, -1.0] {
+            // Seen from outside, `u` and `v` turn to the left about the axis.
+            let at = |u: f64, v: f64| {
+                let mut p = [0.0; 3];
+                (p[axis], p[(axis + 1) % 3], p[(axis + 2) % 3]) = (sign, u, sign * v);
+                p
+            };
+            let flat = Builder::square_of(at);
+            let square: Vec<u32> = flat.iter().map(|&p| b.point(p)).collect();
+            if sign > 0.0 && axis != 1 {
+                let turn = |i: usize| libm::sincos(TAU * i as f64 / N as f64);
+                let circle: Vec<u32> =
+                    (0..N).map(turn).map(|(sin, cos)| b.point(at(radius * cos, radius * sin))).collect();
+                b.strip(&square, &circle, false);
+                circles.push(circle);
+            } else {
+                let middle = vec![b.point(at(0.0, 0.0)); N];
+                b.strip(&square, &middle, false);
+            }
+        }
+    }
+    let mitre: Vec<u32> = (0..N)
+        .map(|i| {
+            let (sin, cos) = libm::sincos(TAU * i as f64 / N as f64);
+            b.point([radius * cos, radius * sin, radius * cos])
+        })
+        .collect();
+    let right: Vec<u32> = (0..N).map(|i| circles[0][(N / 4 + N - i) % N]).collect();
+    b.strip(&circles[1], &mitre, false);
+    b.strip(&mitre, &right, false);
+    surface(&b.points, &b.faces)
+}
+
 fn volume(mesh: &Surface) -> f64 {
     mesh.faces.ids().map(|f| mesh.corners(f)).map(|[a, b, c]| a.dot(b.cross(c)) / 6.0).sum()
 }
@@ -130,7 +171,11 @@ fn characteristic(mesh: &Surface) -> i64 {
 }
 
 fn removed(mesh: &Surface, most: f64, kinds: &[Kind]) -> (Surface, Report) {
-    let (marked, _) = mark_features(mesh, &RULES, &Watch::silent()).expect("nobody interrupts");
+    removed_where(mesh, &RULES, most, kinds)
+}
+
+fn removed_where(mesh: &Surface, rules: &FeatureRules, most: f64, kinds: &[Kind]) -> (Surface, Report) {
+    let (marked, _) = mark_features(mesh, rules, &Watch::silent()).expect("nobody interrupts");
     let (result, report) =
         remove_features(&marked, most, kinds, &LockRules::default(), &Watch::silent()).expect("no locks");
     assert_eq!(validate_surface(&result), []);
@@ -223,7 +268,69 @@ fn a_hole_with_a_step_that_is_too_wide_stays_whole() {
     let [only] = &report.removed[..] else { panic!("{report:?}") };
     assert!((only.diameter - 0.4).abs() < 1e-9, "{report:?}");
     assert_eq!(characteristic(&result), characteristic(&mesh) + 2);
-    assert!(report.rejected.iter().all(|r| r.reason == Reason::TooLarge), "{report:?}");
+    assert!(report.rejected.iter().all(|r| r.reason.is_size()), "{report:?}");
+    let kept: Vec<f64> =
+        report.rejected.iter().filter(|r| r.reason == Reason::StepTooLarge).map(|r| r.diameter).collect();
+    assert!(kept.len() == 2 && kept.iter().all(|d| (d - 0.6).abs() < 1e-9), "the bores are listed too: {report:?}");
+}
+
+#[test]
+fn a_bore_whose_rim_nearly_touches_another_goes() {
+    let mesh = plate(&[0.99, 0.98].map(|r| hole(&[(r, 1.0), (r, 0.0)], true)));
+    let rules = FeatureRules { gap: 0.05, ..RULES };
+    let (marked, dropped) = mark_features(&mesh, &rules, &Watch::silent()).expect("nobody interrupts");
+    assert!(dropped.alongside_edges > 0, "the rims run alongside each other: {dropped:?}");
+    assert!(marked.carried.marks.len() < 4 * N + 12 * N / 4);
+    let (result, report) = removed_where(&mesh, &rules, 2.0, &HOLES);
+    assert_eq!((report.removed.len(), report.rejected.len()), (2, 0), "{report:?}");
+    assert_eq!((characteristic(&mesh), characteristic(&result)), (-2, 2));
+    assert!((volume(&result) - 8.0).abs() < 1e-12);
+}
+
+#[test]
+fn bores_that_end_in_each_other_go_as_one() {
+    let mesh = elbow(0.2);
+    assert_eq!(validate_surface(&mesh), []);
+    assert_eq!(characteristic(&mesh), 0);
+    let (result, report) = removed(&mesh, 0.5, &HOLES);
+    let [only] = &report.removed[..] else { panic!("{report:?}") };
+    assert_eq!((only.kind, only.bores, report.rejected.len()), (Kind::ThroughHoles, 2, 0));
+    assert!((only.diameter - 0.4).abs() < 1e-9, "{report:?}");
+    assert_eq!(characteristic(&result), 2);
+    assert!((volume(&result) - 8.0).abs() < 1e-12);
+    // Where they may not go, both are listed.
+    let mut held = mesh.clone();
+    let is_bore = |p: &DVec3| p.abs().max_element() < 0.5;
+    let bore = mesh.faces.ids().filter(|&f| mesh.corners(f).iter().any(is_bore)).collect();
+    held.carried.groups.faces.insert("bore".into(), bore);
+    let (marked, _) = mark_features(&held, &RULES, &Watch::silent()).expect("nobody interrupts");
+    let keep = ["bore".to_owned()];
+    let locks = LockRules { keep: &keep, ..LockRules::default() };
+    let (same, report) = remove_features(&marked, 0.5, &HOLES, &locks, &Watch::silent()).expect("there is a bore");
+    assert_eq!((same, report.removed.len()), (marked, 0));
+    assert_eq!(report.rejected.iter().map(|r| r.reason).collect::<Vec<_>>(), [Reason::Locked; 2]);
+}
+
+#[test]
+fn openings_that_stay_are_listed() {
+    let sides = |n: usize| {
+        let mut mesh = plate(&[hole(&[(0.5, 1.0), (0.5, 0.0)], true)]);
+        // The rim's vertices onto the sides of a polygon, whose corners are on the circle.
+        for p in mesh.points.iter_mut().filter(|p| libm::hypot(p.x, p.y) < 0.51) {
+            let step = TAU / n as f64;
+            let from_middle = (libm::atan2(p.y, p.x) + 1e-9).rem_euclid(step) - 0.5 * step;
+            let shrunk = libm::cos(0.5 * step) / libm::cos(from_middle);
+            (p.x, p.y) = (p.x * shrunk, p.y * shrunk);
+        }
+        mesh
+    };
+    for n in [4, 8] {
+        let mesh = sides(n);
+        let (result, report) = removed(&mesh, 1.1, &HOLES);
+        assert_eq!(result.faces, mesh.faces, "{n} corners");
+        assert_eq!(report.rejected.iter().map(|r| r.reason).collect::<Vec<_>>(), [Reason::NotRound]);
+        assert!((0.7..1.0).contains(&report.rejected[0].diameter), "{report:?}");
+    }
 }
 
 #[test]
