@@ -159,6 +159,17 @@ fn curvature_puts_faces_where_a_high_ring_bends() {
     let count = |test: &dyn Fn(DVec3) -> bool| mesh.points.iter().filter(|p| test(**p)).count();
     assert!(count(&|p| p.z.abs() > 1.7) > count(&|p| p.z.abs() < 1.0), "{stats:?}");
     assert!(stats.base_faces < stats.front.faces && stats.front.faces < stats.front.finest_faces, "{stats:?}");
+
+    let [largest, smallest] = [1.2, 0.7];
+    let params = AdaptCurvatureParams {
+        largest: Some(Length::Absolute(largest)),
+        smallest: Length::Absolute(smallest),
+        ..AdaptCurvatureParams::default()
+    };
+    let (mesh, stats) = adapt_curvature(&hierarchy, &params, &Watch::silent()).unwrap();
+    let size = |f| triangle_size(mesh.corners(f));
+    assert!(mesh.faces.ids().all(|f| size(f) <= largest), "no face is larger than asked: {stats:?}");
+    assert_eq!(stats.vertices_coarser, 0, "{stats:?}");
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! Takes a mesh from a hierarchy that is the finer the more the surface bends.
 //!
 //! From a coarse front, nodes whose elements are larger than `largest · (1 − min(κ / κ_p, 1))^gamma` are split, with
-//! whatever must be split before them.
+//! whatever must be split before them, until no face has a longer side than any of its vertices asks for.
 //!
 //! Based on: H. Date, S. Kanai, T. Kishinami, I. Nishigaki. Mesh Simplification and Adaptive LOD for Finite Element Mesh
 //! Generation, 2005, section 5.3.1.
@@ -13,7 +13,8 @@
 //! O(n log n) in the nodes above the result; the reported distance costs more.
 //!
 //! # Departures
-//! `κ_p` is a percentile of the curvatures, not the largest, which one spike decides.
+//! `κ_p` is a percentile of the curvatures, not the largest, which one spike decides. The paper compares the mean size of a
+//! vertex's faces when it was made; here the longest side of every face counts as it is in the result.
 
 use std::sync::Arc;
 
@@ -75,6 +76,9 @@ pub struct AdaptCurvatureStats {
     pub base_faces: usize,
     /// Element size where the surface is flat, in mesh units.
     pub largest: f64,
+    /// Vertices of the finest mesh at whose place a face has a longer side than their curvature asks for: one of the
+    /// finest mesh. Those that ask for the smallest faces there are do not count.
+    pub vertices_coarser: usize,
     /// The mesh.
     pub front: FrontReport,
 }
@@ -112,7 +116,7 @@ pub fn adapt_curvature(
     let mut front = Front::base(hierarchy, params.base.map(|base| base.faces(finest.faces.len())));
     let base_faces = front.face_count();
     let diagonal = Aabb::of(finest.points.iter().copied()).diagonal();
-    let of_base = || front.nodes().map(|node| hierarchy.element_size[node]).fold(0.0, f64::max);
+    let of_base = || front.longest_sides().iter().copied().fold(0.0, f64::max);
     let largest = params.largest.map_or_else(of_base, |length| length.resolve(diagonal));
     let smallest = params.smallest.resolve(diagonal);
     let mut thresholds = curvature_thresholds(hierarchy, largest, params.percentile.0, params.gamma);
@@ -120,9 +124,12 @@ pub fn adapt_curvature(
         *size = size.max(smallest);
     }
     watch.phase("refine", None);
-    front.refine_to(&thresholds, watch)?;
+    front.refine_faces_to(&thresholds, watch)?;
+    // A size of 0 asks for the smallest faces there are.
+    let wish = |leaf| if thresholds[leaf] > 0.0 { thresholds[leaf] } else { f64::INFINITY };
+    let vertices_coarser = front.count_coarser(wish);
     let (mesh, report) = extract_measured(&front, params.polish, watch)?;
-    Ok((mesh, AdaptCurvatureStats { base_faces, largest, front: report }))
+    Ok((mesh, AdaptCurvatureStats { base_faces, largest, vertices_coarser, front: report }))
 }
 
 impl From<AdaptCurvatureError> for StepFailure {
@@ -141,7 +148,7 @@ pub struct Step;
 
 impl StepContract for Step {
     const NAME: &'static str = "adapt-curvature";
-    const REVISION: u32 = 3;
+    const REVISION: u32 = 4;
     const INPUTS: &'static [InputDef] = &[InputDef {
         name: "from",
         accepts: &[Port::Hierarchy],

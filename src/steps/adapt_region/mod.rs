@@ -132,12 +132,7 @@ pub fn adapt_region(
     let thresholds: Thresholds = region_thresholds(hierarchy, |leaf| wishes[leaf]);
     watch.phase("refine", None);
     front.refine_faces_to(&thresholds, watch)?;
-    let (stands, longest) = (front.representatives(), front.longest_sides());
-    let is_coarser = |leaf: usize| {
-        let node = stands[NodeId::new(leaf)];
-        node.is_some_and(|node| longest[node] > wishes.as_slice()[leaf])
-    };
-    let coarser = (0..hierarchy.leaf_count()).filter(|&leaf| is_coarser(leaf)).count();
+    let coarser = front.count_coarser(|leaf| thresholds[leaf]);
     let (mesh, report) = extract_measured(&front, params.polish, watch)?;
     Ok((mesh, AdaptRegionStats { base_faces, vertices_selected: selected, vertices_coarser: coarser, front: report }))
 }
@@ -155,12 +150,13 @@ fn wishes(
     if let Some(inside) = region::vertices(finest, params)? {
         is_anything = true;
         let diagonal = region::diagonal(finest);
-        let (stands, longest) = (front.representatives(), front.longest_sides());
-        let current = |leaf: usize| stands[NodeId::new(leaf)].map_or(0.0, |node| longest[node]);
+        let current = params.ratio.map(|ratio| (ratio, front.representatives(), front.longest_sides()));
         for (leaf, _) in inside.enumerate().filter(|(_, is_in)| **is_in) {
-            wishes[leaf] = match (params.size, params.ratio) {
+            wishes[leaf] = match (params.size, &current) {
                 (Some(size), None) => size.resolve(diagonal),
-                (None, Some(ratio)) => ratio * current(leaf.index()),
+                (None, Some((ratio, stands, longest))) => {
+                    stands[NodeId::from_raw(leaf.raw())].map_or(0.0, |node| ratio * longest[node])
+                }
                 (None, None) | (Some(_), Some(_)) => return Err(AdaptRegionError::NotOne),
             };
         }

@@ -91,6 +91,14 @@ impl Front<'_> {
         }
     }
 
+    /// Vertices of the finest mesh at whose place here a face has a longer side than wished for there.
+    /// O(nodes + finest faces).
+    pub fn count_coarser(&self, wish: impl Fn(NodeId) -> f64) -> usize {
+        let (stands, longest) = (self.representatives(), self.longest_sides());
+        let is_coarser = |leaf: &NodeId| stands[*leaf].is_some_and(|node| longest[node] > wish(*leaf));
+        self.hierarchy().nodes().take(self.hierarchy().leaf_count()).filter(is_coarser).count()
+    }
+
     /// The end of a face's longest side that was merged last, where the side is too long for a corner; `None` where it is
     /// not, or neither end can be split.
     fn coarse_end(&self, corners: [NodeId; 3], thresholds: &Thresholds) -> Option<NodeId> {

@@ -29,12 +29,8 @@ pub fn extract(front: &Front<'_>) -> Surface {
 
     let mut faces: IdVec<Face, [VertexId; 3]> = IdVec::with_capacity(front.face_count());
     let mut kept: Renumber<Face> = IdVec::filled(None, finest.faces.len());
-    for (old, corners) in finest.faces.enumerate() {
-        if let [Some(a), Some(b), Some(c)] = corners.map(|v| moved[v])
-            && a != b
-            && b != c
-            && c != a
-        {
+    for (old, corners) in front.faces_by(&stands) {
+        if let [Some(a), Some(b), Some(c)] = corners.map(|node| number[node]) {
             kept[old] = Some(faces.push([a, b, c]));
         }
     }

@@ -2,7 +2,7 @@
 
 use crate::mesh::geometry::triangle_size;
 use crate::mesh::hierarchy::{Hierarchy, Node, NodeId};
-use crate::mesh::id::IdVec;
+use crate::mesh::id::{FaceId, IdVec};
 
 /// Where a node stands relative to the front.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -97,12 +97,20 @@ impl<'a> Front<'a> {
     /// The faces of the mesh by their corners, in the order of the finest mesh. O(nodes + finest faces).
     pub fn faces(&self) -> Vec<[NodeId; 3]> {
         let stands = self.representatives();
-        let corners = self.hierarchy.finest.faces.iter().map(|face| face.map(|v| stands[NodeId::from_raw(v.raw())]));
-        let live = corners.filter_map(|corners| match corners {
-            [Some(a), Some(b), Some(c)] if a != b && b != c && c != a => Some([a, b, c]),
+        self.faces_by(&stands).map(|(_, corners)| corners).collect()
+    }
+
+    /// The faces of the finest mesh that are faces of this one, with their corners there. `stands` are the front's
+    /// [`Front::representatives`].
+    pub(super) fn faces_by<'s>(
+        &'s self,
+        stands: &'s IdVec<Node, Option<NodeId>>,
+    ) -> impl Iterator<Item = (FaceId, [NodeId; 3])> + 's {
+        let finest = self.hierarchy.finest.faces.enumerate();
+        finest.filter_map(|(old, face)| match face.map(|v| stands[NodeId::from_raw(v.raw())]) {
+            [Some(a), Some(b), Some(c)] if a != b && b != c && c != a => Some((old, [a, b, c])),
             _ => None,
-        });
-        live.collect()
+        })
     }
 
     /// The longest side of the faces at each node of the front; 0 at the others. O(nodes + finest faces).
