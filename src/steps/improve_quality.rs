@@ -129,8 +129,9 @@ pub struct ImproveQualityStats {
     pub max_valence: usize,
     /// The tolerance in mesh units (their square in `quadric-sum` mode).
     pub tolerance: f64,
-    /// Certified upper bound of the two-sided distance to `reference`, in mesh units. Absent in the quadric modes, and
-    /// where the input was further away than the tolerance and could not be brought back.
+    /// Certified upper bound of the two-sided distance to `reference`, in mesh units: the tolerance, or less where every
+    /// edit told how far it moved the surface, and 0 where there was none. Absent in the quadric modes, and where the
+    /// input was further away than the tolerance and could not be brought back.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub distance_bound: Option<f64>,
     /// The finest end, where the output is the hierarchy; all other figures are then those of its coarsest front.
@@ -202,13 +203,24 @@ pub fn improve_quality(
     let mut editor = open(surface, &freedom, input.reference, &tree, setup.clone())?;
     let ending = run_phases(&mut editor, params, watch)?;
     let counts = editor.counts();
-    let distance_bound = editor.certified_distance(setup.tolerance);
+    let distance_bound = if lies_on_reference(&input) && counts.edits() == 0 {
+        // Refinement alone leaves the surface the same set of points.
+        editor.distance_bound(setup.tolerance).map(|_| 0.0)
+    } else {
+        editor.distance_bound(setup.tolerance)
+    };
     let mut result = editor.into_mesh().leave().surface;
     inherit_fields(surface, &mut result);
     let target_reached = params.target_faces.is_none() || ending == Ending::Target;
     let end = End { target_reached, faces_refined: surface.faces.len(), counts, distance_bound };
     let stats = stats(&input, &setup, &result, end)?;
     Ok((result, stats))
+}
+
+/// Whether the surface is its own reference.
+fn lies_on_reference(input: &ImproveQualityInput<'_>) -> bool {
+    let ImproveQualityInput { surface, reference, .. } = input;
+    surface.faces == reference.faces && surface.points == reference.points
 }
 
 /// Refines, mends and optimises `input.surface`, then records every collapse that the tolerance allows. The statistics
@@ -376,7 +388,7 @@ pub struct Step;
 
 impl crate::step::Step for Step {
     const NAME: &'static str = "improve-quality";
-    const REVISION: u32 = 12;
+    const REVISION: u32 = 13;
     const INPUTS: &'static [InputDef] = &[
         InputDef { name: "from", accepts: &[Port::Surface], required: true, doc: "the surface to improve" },
         InputDef {

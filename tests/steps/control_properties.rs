@@ -26,6 +26,23 @@ fn the_thresholds_hold_when_counted_again() {
 }
 
 #[test]
+fn the_distance_bound_is_no_larger_than_what_moved() {
+    let bound = |parameters: &str, mesh: &meshmill::mesh::Soup| {
+        let marked = run("features", "", &surface(shapes::surface(mesh))).artifact;
+        let stats = run("control-properties", parameters, &marked).stats;
+        let edits: u64 = ["collapses", "flips", "splits", "moves"].iter().map(|n| stats[n].as_u64().unwrap()).sum();
+        (edits, stats["distance-bound"].as_f64().unwrap(), stats["tolerance"].as_f64().unwrap())
+    };
+    let pure = "optimize = false, min-stretch = 0.0, tolerance = \"1%\"";
+    let (edits, far, _) = bound(&format!("{pure}, target-faces = 100000"), &shapes::sphere(3));
+    assert_eq!((edits, far), (0, 0.0), "nothing was done");
+    let (edits, far, _) = bound(pure, &shapes::subdivided(&shapes::cube(), 3));
+    assert!(edits > 0 && far < 1e-9, "{edits} edits in planes are {far} off");
+    let (edits, far, tolerance) = bound(pure, &shapes::sphere(3));
+    assert!(edits > 0 && far > 0.0 && far <= tolerance, "{edits} edits, {far} of {tolerance}");
+}
+
+#[test]
 fn kept_faces_are_identical_in_the_result() {
     let mesh = surface(shapes::surface(&shapes::subdivided(&shapes::cube(), 3)));
     let named = run("select", "name = \"top\", normal = { direction = [0, 0, 1] }", &mesh).artifact;

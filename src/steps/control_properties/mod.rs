@@ -150,7 +150,7 @@ pub fn control_properties(
     let mut editor = open(input.surface, &freedom, input.reference, &tree, setup.clone())?;
     let ending = run_phases(&mut editor, params, watch)?;
     let counts = editor.counts();
-    let distance_bound = editor.certified_distance(setup.tolerance);
+    let distance_bound = editor.distance_bound(setup.tolerance);
     let mut result = editor.into_mesh().leave().surface;
     inherit_fields(input.surface, &mut result);
     let stats = stats(&input, params, &setup, &result, End { ending, counts, distance_bound })?;
@@ -280,7 +280,7 @@ pub struct Step;
 
 impl crate::step::Step for Step {
     const NAME: &'static str = "control-properties";
-    const REVISION: u32 = 12;
+    const REVISION: u32 = 13;
     const INPUTS: &'static [InputDef] = &[
         InputDef { name: "from", accepts: &[Port::Surface], required: true, doc: "the surface to simplify" },
         InputDef {

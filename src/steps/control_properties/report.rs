@@ -68,8 +68,9 @@ pub struct ControlPropertiesStats {
     pub violations: Vec<Violation>,
     /// The tolerance in mesh units (their square in `quadric-sum` mode).
     pub tolerance: f64,
-    /// Certified upper bound of the two-sided distance to `reference`, in mesh units. Absent in the quadric modes, and
-    /// where the input was further away than the tolerance and could not be brought back.
+    /// Certified upper bound of the two-sided distance to `reference`, in mesh units: the tolerance, or less where every
+    /// edit told how far it moved the surface, and 0 where there was none. Absent in the quadric modes, and where the
+    /// input was further away than the tolerance and could not be brought back.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub distance_bound: Option<f64>,
     /// The finest end, where the output is the hierarchy; all other figures are then those of its coarsest front.

@@ -52,6 +52,13 @@ pub struct Counts {
     pub collisions: usize,
 }
 
+impl Counts {
+    /// Edits applied.
+    pub fn edits(self) -> usize {
+        self.collapses + self.flips + self.splits + self.moves
+    }
+}
+
 impl std::ops::Add for Counts {
     type Output = Self;
 
@@ -161,6 +168,16 @@ impl<'a> Editor<'a> {
             Keeper::Distance { envelope, .. } => envelope.certifies(&self.mesh, tolerance).then_some(tolerance),
             Keeper::QuadricSum { .. } | Keeper::QuadricRms { .. } => None,
         }
+    }
+
+    /// As [`Editor::certified_distance`], and nearer where the surface began as the reference and every edit told how far
+    /// it moved the surface: 0 where there was none.
+    pub fn distance_bound(&mut self, tolerance: f64) -> Option<f64> {
+        let traced = match &self.keeper {
+            Keeper::Distance { envelope, .. } => envelope.traced(&self.mesh),
+            Keeper::QuadricSum { .. } | Keeper::QuadricRms { .. } => None,
+        };
+        traced.or_else(|| self.certified_distance(tolerance))
     }
 
     /// Shows every collapse from now on to `recorder`, which was made with the surface of this workshop.

@@ -75,6 +75,10 @@ pub struct Envelope<'a> {
     /// A bound of the distance of each live face from the reference; infinite where none is known.
     strays: Vec<f32>,
     drift: Drift,
+    /// Whether the mesh began as the reference and all edits since were bounded by how far they moved the surface.
+    is_traced: bool,
+    /// Whether the last edit tested was.
+    follows: bool,
     /// The bounds of the faces of the last edit tested: old ones, and new ones.
     known: Vec<f64>,
     found: Vec<f64>,
@@ -107,6 +111,8 @@ impl<'a> Envelope<'a> {
             cover,
             strays: vec![stray; slots],
             drift: Drift::default(),
+            is_traced: own.is_none(),
+            follows: false,
             known: Vec::new(),
             found: Vec::new(),
             hint: 0,
@@ -133,6 +139,16 @@ impl<'a> Envelope<'a> {
         });
         (self.reach, self.finest) = kept;
         within && self.cover.uncovered == 0
+    }
+
+    /// A bound of the two-sided distance from what edits have moved; `None` where some edit was admitted without one, or
+    /// the mesh did not begin as the reference.
+    ///
+    /// A bound of a new face is that of the old faces below it and the gap between them. The same gap takes whatever
+    /// lies on the old faces to the new one, so the bounds of all faces hold for the reference's points as well.
+    pub fn traced(&self, mesh: &HalfedgeMesh) -> Option<f64> {
+        let strays = mesh.faces().map(|f| f64::from(self.strays[f.index()]));
+        self.is_traced.then(|| strays.fold(0.0, f64::max))
     }
 
     /// The distance that edits keep.
@@ -167,9 +183,11 @@ impl<'a> Envelope<'a> {
             found.clear();
             let most = known.iter().copied().fold(0.0, f64::max);
             found.resize(change.new.len(), most + SAME * self.reach);
+            self.follows = true;
             true
         } else {
             self.drift.bounds(change.was, &known, change.new, &mut found);
+            self.follows = found.iter().all(|bound| *bound <= SURE * self.reach);
             self.bounds_hold(change.new, &mut found)
         };
         (self.known, self.found) = (known, found);
@@ -279,6 +297,7 @@ impl<'a> Envelope<'a> {
             // The cast may round down.
             self.strays[face.index()] = bound as f32 * (1.0 + 2.0 * f32::EPSILON);
         }
+        self.is_traced &= self.follows;
         self.cover.commit(old, targets);
     }
 }

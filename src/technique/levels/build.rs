@@ -40,7 +40,7 @@ pub struct Recorded {
     pub hierarchy: Hierarchy,
     /// Edits before the record and in it.
     pub counts: Counts,
-    /// The certified distance of the coarsest front, see [`crate::technique::collapse::Editor::certified_distance`].
+    /// The certified distance of the coarsest front, see [`crate::technique::collapse::Editor::distance_bound`].
     pub distance_bound: Option<f64>,
 }
 
@@ -84,6 +84,6 @@ where
         simplify(&mut editor, rules, Goal::default(), watch)?;
     }
     let hierarchy = editor.take_recorder().map(Recorder::finish).unwrap_or_default();
-    let distance_bound = editor.certified_distance(setup.tolerance);
+    let distance_bound = editor.distance_bound(setup.tolerance);
     Ok(Recorded { hierarchy, counts: before + editor.counts(), distance_bound })
 }
