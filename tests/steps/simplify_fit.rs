@@ -89,6 +89,11 @@ fn fillets_stay_on_their_radius_and_flat_faces_flat() {
         on_fits += 1;
     }
     assert!(on_fits > 20, "only {on_fits} vertices lie on fits");
+    // Twelve fillets and eight corners, all of one radius, and nothing else.
+    let fillets = made.stats["fillets"].as_array().unwrap();
+    let counts = fillets.iter().map(|bin| (bin["kind"].as_str().unwrap(), bin["count"].as_u64().unwrap()));
+    assert_eq!(counts.collect::<Vec<_>>(), [("cylinder", 12), ("sphere", 8)]);
+    assert!(fillets.iter().all(|bin| (bin["radius"].as_f64().unwrap() - RADIUS).abs() < 1e-6 * RADIUS));
     assert_eq!(made.stats["vertices-on-fits"].as_u64(), Some(on_fits));
     let flat = &result.carried.groups.faces["flat"];
     assert!(!flat.is_empty());

@@ -4,7 +4,7 @@ use glam::DVec3;
 use smallvec::SmallVec;
 
 use super::surfaces::{Kind, Surfaces};
-use super::{Fits, SimplifyFitParams};
+use super::{Fillets, Fits, SimplifyFitParams};
 use crate::mesh::edit::Placement;
 use crate::mesh::geometry::{area_vector, aspect_ratio};
 use crate::mesh::halfedge::{edge_of, halfedge_of};
@@ -20,7 +20,7 @@ pub(super) const MOST_TRIED: usize = 2;
 pub(super) const MOST_VALENCE: usize = 14;
 
 /// What was done, by case.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Done {
     /// By the number of corners above the threshold: face collapses, edge collapses.
     pub(super) cases: [[usize; 2]; 4],
@@ -28,6 +28,8 @@ pub(super) struct Done {
     pub(super) onto: usize,
     /// Largest distance between a projected point and the plane that it was measured against.
     pub(super) largest_projection: f64,
+    /// What the part consisted of before the first edit.
+    pub(super) fillets: Vec<Fillets>,
 }
 
 /// What became of a face.
@@ -81,6 +83,8 @@ impl Bench<'_, '_> {
         let at = self.editor.mesh().point(v);
         let fit = self.surfaces.number(v);
         self.keep_fit(v, at, fit, true);
+        let origins = self.surfaces.origins(&[v]);
+        self.surfaces.come_from(v, at, origins);
         self.update(v);
     }
 
@@ -272,8 +276,10 @@ impl Bench<'_, '_> {
             return None;
         }
         let (fit, moved) = (self.surfaces.number(stay), self.surfaces.was_moved(stay));
+        let origins = self.surfaces.origins(&merge.ends);
         let v = self.editor.try_merge(&merge, at, rules)?;
         self.keep_fit(v, at, fit, moved);
+        self.surfaces.come_from(v, at, origins);
         Some(v)
     }
 
@@ -310,36 +316,80 @@ impl Bench<'_, '_> {
         if self.editor.rim().count() > MOST_VALENCE {
             return None;
         }
-        let is_free = merge.placement == Placement::Anywhere;
         // Cheap tests first: a star that no guard will admit needs no fit.
         if self.editor.stretch_at(first) <= 0.0 {
             return None;
         }
-        if is_free && let Some(kinds) = kinds {
-            for kind in kinds {
-                if !self.allows(kind) {
-                    continue;
-                }
-                let Some(quadric) = self.surfaces.trial(self.editor.mesh(), &merge.ends, kind) else { continue };
-                for &wish in wishes {
-                    let Some(p) = quadric.project(wish) else { continue };
-                    let error = (p - wish).dot(normal.normalize_or_zero()).abs();
-                    if self.plane_tolerance.is_some_and(|most| error > most) {
-                        continue;
-                    }
-                    if let Some(v) = self.editor.try_merge(merge, p, rules) {
-                        self.done.largest_projection = self.done.largest_projection.max(error);
-                        self.surfaces.accept(v, kind, quadric);
-                        return Some(v);
-                    }
-                }
-                break;
+        if merge.placement == Placement::Anywhere
+            && let Some(v) = self.place_on_fit(merge, wishes, normal, kinds, rules)
+        {
+            return Some(v);
+        }
+        self.place_anywhere(merge, wishes, rules)
+    }
+
+    /// Puts the merged vertex onto the fit that all it merges come from, or onto that of a trial.
+    fn place_on_fit(
+        &mut self,
+        merge: &Merge,
+        wishes: &[DVec3],
+        normal: DVec3,
+        kinds: Option<[Kind; 2]>,
+        rules: &CollapseRules,
+    ) -> Option<VertexId> {
+        let known = self.surfaces.common(self.editor.mesh(), &merge.ends);
+        for &fit in &known {
+            if let Some(v) = self.place_on(fit, merge, wishes, normal, rules) {
+                return Some(v);
             }
         }
+        if !known.is_empty() {
+            return None;
+        }
+        let quadric = kinds?.into_iter().find_map(|kind| {
+            self.allows(kind).then(|| self.surfaces.trial(self.editor.mesh(), &merge.ends, kind)).flatten()
+        })?;
+        let fit = self.surfaces.add(quadric);
+        self.place_on(fit, merge, wishes, normal, rules)
+    }
+
+    fn place_on(
+        &mut self,
+        fit: u32,
+        merge: &Merge,
+        wishes: &[DVec3],
+        normal: DVec3,
+        rules: &CollapseRules,
+    ) -> Option<VertexId> {
+        let quadric = self.surfaces.quadric(fit);
+        let origins = self.surfaces.origins(&merge.ends);
+        for &wish in wishes {
+            let Some(p) = quadric.project(wish) else { continue };
+            let error = (p - wish).dot(normal.normalize_or_zero()).abs();
+            if self.plane_tolerance.is_some_and(|most| error > most) {
+                continue;
+            }
+            if let Some(v) = self.editor.try_merge(merge, p, rules) {
+                self.done.largest_projection = self.done.largest_projection.max(error);
+                self.surfaces.accept(v, fit);
+                self.surfaces.come_from(v, p, origins);
+                return Some(v);
+            }
+        }
+        None
+    }
+
+    /// Puts the merged vertex where the first wish allows, with what it still stands for.
+    fn place_anywhere(&mut self, merge: &Merge, wishes: &[DVec3], rules: &CollapseRules) -> Option<VertexId> {
+        let first = *wishes.first()?;
+        let origins = self.surfaces.origins(&merge.ends);
         let kept: SmallVec<[_; 3]> = merge
             .ends
             .iter()
-            .map(|&v| (self.editor.mesh().point(v), self.surfaces.number(v), self.surfaces.was_moved(v)))
+            .map(|&v| {
+                let at = self.editor.mesh().point(v);
+                (at, self.surfaces.number(v), self.surfaces.was_moved(v))
+            })
             .collect();
         // What the collapsed edge or face allows no more, a place above it may: chords of a round face sink into it.
         let above = |editor: &Editor<'_>| editor.optimum(merge, first);
@@ -347,8 +397,11 @@ impl Bench<'_, '_> {
             let Some(wish) = wishes.get(at).copied().or_else(|| above(self.editor)) else { break };
             let Some(v) = self.editor.try_merge(merge, wish, rules) else { continue };
             let at = self.editor.mesh().point(v);
-            let stayed = kept.iter().find(|(p, _, _)| *p == at);
-            self.keep_fit(v, at, stayed.and_then(|s| s.1), stayed.is_none_or(|s| s.2));
+            let stayed = kept.into_iter().find(|kept| kept.0 == at);
+            let (_, fit, moved) = stayed.unwrap_or((at, None, true));
+            let fit = fit.or_else(|| origins.iter().copied().find(|&fit| self.surfaces.holds(fit, at)));
+            self.keep_fit(v, at, fit, moved);
+            self.surfaces.come_from(v, at, origins);
             return Some(v);
         }
         None

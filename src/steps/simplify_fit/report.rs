@@ -5,12 +5,12 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::cases::MOST_VALENCE;
+use super::cases::{Done, MOST_VALENCE};
 use crate::mesh::geometry::{aspect_ratio, centroid, stretch};
 use crate::mesh::{EdgeId, ResolvedFreedom, Surface};
 use crate::technique::collapse::session::{Cause, cause};
-use crate::technique::collapse::{Bars, CollapseRules, Editor, Order, Priority};
-use crate::technique::fit::Quadric;
+use crate::technique::collapse::{Bars, CollapseRules, Counts, Editor, Order, Priority};
+use crate::technique::fit::{FitRegion, Quadric};
 
 /// How it ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
@@ -72,6 +72,22 @@ pub struct RadiusBin {
     pub range: [f64; 2],
     /// Vertices of the result on fits with such a radius.
     pub vertices: usize,
+}
+
+/// Spheres or cylinders of one radius that the input consists of.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub struct Fillets {
+    /// Sphere or cylinder.
+    pub kind: FitKind,
+    /// The mean radius, in mesh units.
+    pub radius: f64,
+    /// The smallest and the largest radius of these.
+    pub range: [f64; 2],
+    /// How many there are.
+    pub count: usize,
+    /// Faces of the input on them.
+    pub faces: usize,
 }
 
 /// The kind of a fit; as a field 1 for spheres, 2 for cylinders.
@@ -137,9 +153,12 @@ pub struct SimplifyFitStats {
     pub spheres: Trials,
     /// Trial fits of cylinders.
     pub cylinders: Trials,
+    /// The spheres and cylinders that the input consists of, by radius, most faces first, at most 32: holes, bosses and
+    /// fillets. Faces beside them are flat, or of other kinds, as where a fillet follows a curve.
+    pub fillets: Vec<Fillets>,
     /// Vertices of the result that lie on an accepted fit.
     pub vertices_on_fits: usize,
-    /// The radii of these fits, most vertices first, at most 32.
+    /// The radii of the fits under them, most vertices first, at most 32.
     pub radii: Vec<RadiusBin>,
     /// The largest Err of the paper: distance of a projected vertex from the plane of what it replaced, in mesh units.
     pub largest_projection: f64,
@@ -198,6 +217,46 @@ pub(super) fn histogram(fits: impl Iterator<Item = (FitKind, f64)>) -> Vec<Radiu
     bins
 }
 
+/// The recognised regions by kind and radius.
+pub(super) fn fillets(regions: &[FitRegion]) -> Vec<Fillets> {
+    let key = |region: &FitRegion| (FitKind::of(&region.quadric), region.quadric.radius());
+    let mut sorted: Vec<&FitRegion> = regions.iter().collect();
+    sorted.sort_by(|a, b| key(a).0.cmp(&key(b).0).then(key(a).1.total_cmp(&key(b).1)));
+    let is_one = |a: &&FitRegion, b: &&FitRegion| key(a).0 == key(b).0 && key(b).1 - key(a).1 <= SAME_RADIUS * key(a).1;
+    let mut fillets: Vec<Fillets> = sorted
+        .chunk_by(is_one)
+        .map(|same| Fillets {
+            kind: key(same[0]).0,
+            radius: same.iter().map(|region| key(region).1).sum::<f64>() / same.len() as f64,
+            range: [key(same[0]).1, key(same[same.len() - 1]).1],
+            count: same.len(),
+            faces: same.iter().map(|region| region.faces.len()).sum(),
+        })
+        .collect();
+    fillets.sort_by(|a, b| b.faces.cmp(&a.faces).then(a.kind.cmp(&b.kind)).then(a.radius.total_cmp(&b.radius)));
+    fillets.truncate(MOST_BINS);
+    fillets
+}
+
+/// The operations by case, and what came after them.
+pub(super) fn operations(done: &Done, counts: Counts) -> Operations {
+    let [flat, one, two, three] = done.cases;
+    let merged = 2 * (flat[0] + three[0]) + flat[1] + one[1] + two[1] + three[1];
+    Operations {
+        flat_faces: flat[0],
+        flat_edges: flat[1],
+        opposite_edges: one[1],
+        feature_edges: two[1] - done.onto,
+        onto_features: done.onto,
+        transitional_faces: three[0],
+        transitional_edges: three[1],
+        mended_edges: counts.collapses.saturating_sub(merged),
+        flips: counts.flips,
+        halvings: counts.splits,
+        moves: counts.moves,
+    }
+}
+
 /// What bars the edges that are left.
 pub(super) fn bars(editor: &mut Editor<'_>, min_stretch: f64) -> Bars {
     let rules = CollapseRules {
@@ -253,6 +312,7 @@ pub(super) fn quality(
         operations: Operations::default(),
         spheres: Trials::default(),
         cylinders: Trials::default(),
+        fillets: Vec::new(),
         vertices_on_fits: 0,
         radii: Vec::new(),
         largest_projection: 0.0,

@@ -1,4 +1,5 @@
-//! Spheres and cylinders under the vertices: trial fits of neighbourhoods, and which vertex lies on which.
+//! Spheres and cylinders under the vertices: which were there before the first edit, trial fits of neighbourhoods where
+//! none was, and which vertex lies on which.
 
 use glam::DVec3;
 use smallvec::SmallVec;
@@ -6,20 +7,11 @@ use smallvec::SmallVec;
 use crate::mesh::geometry::{angle, area_vector, centroid};
 use crate::mesh::halfedge::{HalfedgeMesh, edge_of, twin};
 use crate::mesh::{FaceId, Freedom, VertexId};
-use crate::technique::fit::{FitQuality, Quadric, fit_cylinder, fit_sphere};
+use crate::technique::fit::regions::{ENOUGH_POINTS, LEAST_OPENING, MOST_TILT, is_certain};
+use crate::technique::fit::{FitQuality, FitRegion, Quadric, fit_cylinder, fit_sphere};
 
-/// Points that a trial asks for before it widens the neighbourhood.
-const ENOUGH_POINTS: usize = 8;
-
-/// The least half opening of a neighbourhood, in radians: 15 degrees, an arc of 30.
-const LEAST_OPENING: f64 = 0.262;
-
-/// The largest share of the radius by which it may be uncertain: one standard deviation, so that hardly a radius is
-/// off by a hundredth.
-const MOST_DEVIATION: f64 = 0.004;
-
-/// The largest mean angle in radians between the faces' normals and the fit's: 20 degrees.
-const MOST_TILT: f64 = 0.35;
+/// Corners of a region that was there before the first edit lie no further off its fit than this share of the tolerance.
+pub(super) const NEAR: f64 = 0.25;
 
 /// Neighbouring faces whose normals differ by more than this many radians, 50 degrees, are no smooth continuation.
 const SMOOTH: f64 = 0.873;
@@ -48,11 +40,17 @@ struct Patch {
     vectors: Vec<DVec3>,
 }
 
-/// Accepted fits, and the vertices on them.
+/// Numbers of fits.
+pub(super) type Origins = SmallVec<[u32; 2]>;
+
+/// Fits, and the vertices on them.
 #[derive(Debug)]
 pub(super) struct Surfaces {
     fits: Vec<Quadric>,
+    /// The fit that a vertex lies on, to rounding.
     of_vertex: Vec<u32>,
+    /// The fits of the part that a vertex comes from and lies near.
+    origins: Vec<Origins>,
     /// Vertices that were moved and are on no fit: they say nothing of the surface that was there.
     moved: Vec<bool>,
     patch: Patch,
@@ -66,6 +64,7 @@ impl Surfaces {
         Self {
             fits: Vec::new(),
             of_vertex: vec![NONE; vertex_slots],
+            origins: vec![Origins::new(); vertex_slots],
             moved: vec![false; vertex_slots],
             patch: Patch::default(),
             tolerance,
@@ -74,25 +73,86 @@ impl Surfaces {
         }
     }
 
+    /// Takes in the regions of the part, before the first edit.
+    pub(super) fn know(&mut self, mesh: &HalfedgeMesh, regions: &[FitRegion]) {
+        for region in regions {
+            let number = self.fits.len() as u32;
+            self.fits.push(region.quadric);
+            for v in region.faces.iter().flat_map(|&f| mesh.corners(f)) {
+                let origins = &mut self.origins[v.index()];
+                if origins.last() != Some(&number) {
+                    origins.push(number);
+                }
+            }
+        }
+    }
+
+    /// The fits that some vertex of these comes from, and all of them lie near.
+    pub(super) fn common(&self, mesh: &HalfedgeMesh, vertices: &[VertexId]) -> Origins {
+        let mut common = Origins::new();
+        for &fit in vertices.iter().filter_map(|v| self.origins.get(v.index())).flatten() {
+            if !common.contains(&fit) && vertices.iter().all(|&v| self.is_near(fit, mesh.point(v))) {
+                common.push(fit);
+            }
+        }
+        common
+    }
+
+    fn is_near(&self, fit: u32, p: DVec3) -> bool {
+        self.fits[fit as usize].distance(p).abs() <= NEAR * self.tolerance
+    }
+
+    /// Says that a vertex came to `at` out of others that come from `origins`; it comes from those that it lies near.
+    pub(super) fn come_from(&mut self, v: VertexId, at: DVec3, mut origins: Origins) {
+        self.reach(v);
+        origins.retain(|fit| self.is_near(*fit, at));
+        self.origins[v.index()] = origins;
+    }
+
+    /// The fits that some vertices come from.
+    pub(super) fn origins(&self, vertices: &[VertexId]) -> Origins {
+        let mut all: Origins = vertices.iter().filter_map(|v| self.origins.get(v.index())).flatten().copied().collect();
+        all.sort_unstable();
+        all.dedup();
+        all
+    }
+
+    pub(super) fn quadric(&self, fit: u32) -> Quadric {
+        self.fits[fit as usize]
+    }
+
     /// The fit that a vertex lies on.
     pub(super) fn of(&self, v: VertexId) -> Option<&Quadric> {
         self.fits.get(*self.of_vertex.get(v.index())? as usize)
     }
 
-    /// Says that the vertex was put on a fit.
-    pub(super) fn accept(&mut self, v: VertexId, kind: Kind, quadric: Quadric) {
-        self.accepted[kind as usize] += 1;
+    /// Takes in the fit of a trial, and gives its number.
+    pub(super) fn add(&mut self, quadric: Quadric) -> u32 {
         self.fits.push(quadric);
-        let number = self.fits.len() as u32 - 1;
-        self.carry(v, Some(number), false);
+        self.fits.len() as u32 - 1
+    }
+
+    /// Says that the vertex was put on a fit.
+    pub(super) fn accept(&mut self, v: VertexId, fit: u32) {
+        let kind = match self.quadric(fit) {
+            Quadric::Sphere(_) => Kind::Sphere,
+            Quadric::Cylinder(_) => Kind::Cylinder,
+        };
+        self.accepted[kind as usize] += 1;
+        self.carry(v, Some(fit), false);
+    }
+
+    fn reach(&mut self, v: VertexId) {
+        if v.index() >= self.of_vertex.len() {
+            self.of_vertex.resize(v.index() + 1, NONE);
+            self.origins.resize(v.index() + 1, Origins::new());
+            self.moved.resize(v.index() + 1, false);
+        }
     }
 
     /// Says that the vertex stayed on the fit of one whose place it took, or is on none; and whether it was moved.
     pub(super) fn carry(&mut self, v: VertexId, fit: Option<u32>, moved: bool) {
-        if v.index() >= self.of_vertex.len() {
-            self.of_vertex.resize(v.index() + 1, NONE);
-            self.moved.resize(v.index() + 1, false);
-        }
+        self.reach(v);
         self.of_vertex[v.index()] = fit.unwrap_or(NONE);
         self.moved[v.index()] = moved;
     }
@@ -144,7 +204,7 @@ impl Surfaces {
     }
 
     fn is_good(&self, quadric: &Quadric, quality: &FitQuality) -> bool {
-        quality.rms <= 0.5 * self.tolerance && quality.radius_deviation <= MOST_DEVIATION * quadric.radius()
+        quality.rms <= 0.5 * self.tolerance && is_certain(quadric, quality)
     }
 
     /// Whether the faces' normals point along the fit's, all to one side.

@@ -66,6 +66,17 @@ pub fn fit_cylinder(points: &[DVec3], area_vectors: &[DVec3]) -> Result<(Cylinde
     Ok((cylinder, quality(points, &Quadric::Cylinder(cylinder), reach, solved)))
 }
 
+/// The cylinder through points along a known axis, a unit vector.
+///
+/// # Errors
+/// Points that lie in a plane along the axis.
+pub(super) fn cylinder_along(points: &[DVec3], axis: DVec3) -> Result<Cylinder, FitError> {
+    let (origin, reach) = frame(points)?;
+    let local: Vec<DVec3> = points.iter().map(|&p| (p - origin) / reach).collect();
+    let cylinder = algebraic(&local, axis)?;
+    Ok(Cylinder { point: origin + reach * cylinder.point, radius: reach * cylinder.radius, axis })
+}
+
 /// The direction that all normals are nearly at right angles to.
 fn axis_of(area_vectors: &[DVec3]) -> Result<DVec3, FitError> {
     let mut m = [0.0; 6];

@@ -12,6 +12,7 @@
 //! an exact sphere or cylinder give that one within 1e-9 of its radius. Cost: linear in the points, ten rounds at most.
 
 mod cylinder;
+pub mod regions;
 mod sphere;
 #[cfg(test)]
 mod tests;
@@ -19,6 +20,7 @@ mod tests;
 use glam::DVec3;
 
 pub use cylinder::{Cylinder, fit_cylinder};
+pub use regions::{FitRegion, fit_regions};
 pub use sphere::{Sphere, fit_sphere};
 
 /// Rounds of Gauss-Newton.
