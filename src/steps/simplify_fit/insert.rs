@@ -162,13 +162,17 @@ fn length(bench: &Bench<'_, '_>, h: HalfedgeId) -> f64 {
 /// Splits an edge, and flips round the new vertex.
 fn split(bench: &mut Bench<'_, '_>, h: HalfedgeId, share: f64) -> Option<VertexId> {
     let mesh = bench.editor.mesh();
-    let at = mesh.point(mesh.origin(h)).lerp(mesh.point(mesh.target(h)), share);
+    let ends = [mesh.origin(h), mesh.target(h)];
+    let at = mesh.point(ends[0]).lerp(mesh.point(ends[1]), share);
+    let origins = bench.surfaces.origins(&ends);
     // The halves are needles still, until flips make better faces of them.
     let limit = bench.editor.set_min_stretch(0.0);
     let made = bench.editor.try_split(edge_of(h), at);
     bench.editor.set_min_stretch(limit);
     let v = made?;
+    let at = bench.editor.mesh().point(v);
     bench.surfaces.carry(v, None, true);
+    bench.surfaces.come_from(v, at, origins);
     bench.update(v);
     flip_round(bench, v);
     Some(v)

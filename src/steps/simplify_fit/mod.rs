@@ -172,7 +172,7 @@ impl SimplifyFitParams {
         Wanted {
             spheres: matches!(self.fit, Fits::Both | Fits::Sphere),
             cylinders: matches!(self.fit, Fits::Both | Fits::Cylinder),
-            near: surfaces::NEAR * tolerance,
+            near: surfaces::EXACT * tolerance,
         }
     }
 }

@@ -44,24 +44,20 @@ const LEAST_BEND: f64 = 0.009;
 
 /// A neighbourhood is widened until normals turn by this angle in radians, 15 degrees, or until it has so many faces.
 const SPREAD: f64 = 0.262;
-const MOST_FACES: usize = 120;
-
-/// Faces near a seed in vain that are no seeds, at most.
-const MOST_PASSED: usize = 16;
 
 /// A face that so many refused candidates took in is no seed: else a large area that is nearly a fit would be grown over
 /// again from each of its faces.
 const MOST_VAIN: u8 = 8;
 
-/// How near corners lie in each search, as a share of what is allowed: exact surfaces first, that none of them takes a
-/// part of its neighbour, then what noise has moved.
-const EXACTNESS: [f64; 2] = [0.01, 1.0];
+/// A neighbourhood has no more faces than these, and so many round a seed in vain are no seeds.
+const MOST_FACES: usize = 32;
+const MOST_PASSED: usize = 8;
 
 /// Fits to a region, each to what the one before took in.
-const MOST_FITS: usize = 4;
+const MOST_FITS: usize = 3;
 
-/// Points that a fit to a region looks at, at most.
-const MOST_POINTS: usize = 512;
+/// Faces that a fit to a region looks at, at most, evenly out of all.
+const MOST_FITTED: usize = 48;
 
 const NONE: u32 = u32::MAX;
 
@@ -100,18 +96,14 @@ pub fn fit_regions(mesh: &HalfedgeMesh, wanted: Wanted, watch: &Watch) -> Result
         round: 0,
         found: Vec::new(),
     };
-    for exactness in EXACTNESS {
-        finder.wanted.near = exactness * wanted.near;
-        finder.vain.fill(0);
-        watch.phase("recognise fillets", Some(slots as u64));
-        for (place, f) in mesh.faces().enumerate() {
-            if place.is_multiple_of(1024) {
-                watch.check()?;
-                watch.advance(place as u64, || format!("{} found", finder.found.len()));
-            }
-            if finder.of_face[f.index()] == NONE && finder.vain[f.index()] < MOST_VAIN {
-                finder.seed(f);
-            }
+    watch.phase("recognise fillets", Some(slots as u64));
+    for (place, f) in mesh.faces().enumerate() {
+        if place.is_multiple_of(1024) {
+            watch.check()?;
+            watch.advance(place as u64, || format!("{} found", finder.found.len()));
+        }
+        if finder.of_face[f.index()] == NONE && finder.vain[f.index()] < MOST_VAIN {
+            finder.seed(f);
         }
     }
     Ok(finder.found)
@@ -146,14 +138,14 @@ impl Finder<'_> {
                 }
                 self.found.push(region);
             }
-            None => self.pass_over(f, &near),
+            None => self.pass_over(&near),
         }
     }
 
     fn candidates(&self, f: FaceId, near: &[FaceId]) -> Vec<Quadric> {
         let mut candidates = Vec::new();
         if self.wanted.cylinders {
-            candidates.extend(self.sides(f).into_iter().filter_map(|h| self.through_facets(f, h)));
+            candidates.extend(self.through_facets(f));
         }
         let vectors: Vec<DVec3> = near.iter().map(|&g| self.vector(g)).collect();
         let own = self.vector(f);
@@ -171,11 +163,14 @@ impl Finder<'_> {
         candidates
     }
 
-    /// The cylinder through a face and the one over a side of it.
-    fn through_facets(&self, f: FaceId, h: HalfedgeId) -> Option<Quadric> {
-        let g = self.over(h)?;
-        let (n, m) = (self.vector(f).try_normalize()?, self.vector(g).try_normalize()?);
-        let across = n.cross(m);
+    /// The cylinder through a face and that neighbour which turns most from it.
+    fn through_facets(&self, f: FaceId) -> Option<Quadric> {
+        let n = self.vector(f).try_normalize()?;
+        let bends = self.sides(f).into_iter().filter_map(|h| {
+            let g = self.over(h)?;
+            Some((n.cross(self.vector(g).try_normalize()?), g))
+        });
+        let (across, g) = bends.max_by(|a, b| a.0.length_squared().total_cmp(&b.0.length_squared()))?;
         (across.length() >= LEAST_BEND).then_some(())?;
         cylinder_along(&self.points(&[f, g]), across.normalize()).ok().map(Quadric::Cylinder)
     }
@@ -210,9 +205,9 @@ impl Finder<'_> {
     }
 
     fn fit(&self, faces: &[FaceId], like: &Quadric) -> Option<(Quadric, FitQuality)> {
-        let mut points = self.points(faces);
-        let step = points.len().div_ceil(MOST_POINTS).max(1);
-        points = points.into_iter().step_by(step).collect();
+        let step = faces.len().div_ceil(MOST_FITTED).max(1);
+        let faces: Vec<FaceId> = faces.iter().copied().step_by(step).collect();
+        let points = self.points(&faces);
         match like {
             Quadric::Sphere(_) => fit_sphere(&points).ok().map(|(s, q)| (Quadric::Sphere(s), q)),
             Quadric::Cylinder(_) => {
@@ -280,13 +275,10 @@ impl Finder<'_> {
         faces
     }
 
-    /// Neighbours of a face in vain are hardly better seeds, nor is what lies in one plane with it.
-    fn pass_over(&mut self, f: FaceId, near: &[FaceId]) {
-        let own = self.vector(f);
-        for (place, &g) in near.iter().take(MOST_PASSED).enumerate() {
-            if place < 4 || angle(own, self.vector(g)) < LEAST_BEND {
-                self.vain[g.index()] = MOST_VAIN;
-            }
+    /// What lies round a face in vain is hardly a better seed.
+    fn pass_over(&mut self, near: &[FaceId]) {
+        for g in near.iter().take(MOST_PASSED) {
+            self.vain[g.index()] = MOST_VAIN;
         }
     }
 
