@@ -154,7 +154,7 @@ pub struct SimplifyFitStats {
     /// Trial fits of cylinders.
     pub cylinders: Trials,
     /// The spheres and cylinders that the input consists of, by radius, most faces first, at most 32: holes, bosses and
-    /// fillets. Faces beside them are flat, or of other kinds, as where a fillet follows a curve.
+    /// fillets. Where a fillet follows a curve, each row of its facets counts as a short cylinder.
     pub fillets: Vec<Fillets>,
     /// Vertices of the result that lie on an accepted fit.
     pub vertices_on_fits: usize,
