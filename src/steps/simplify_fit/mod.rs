@@ -23,12 +23,13 @@
 //!
 //! # Departures
 //! The corrections of the printed formulas are told where they are used: `technique::{dispersion, aspect_point, fit}`.
-//! Beyond these: on real tessellations the paper's trials nearly always fail, because a neighbourhood takes in what lies
-//! beside the fillet and merged vertices tell little of it, so fillets are recognised first; smooth borders of flat faces are curves; when the shortest side may not go, the next one below the same
-//! length may; in the fourth case both kinds of fit are tried, the paper's first; positions beside the optimised one are
-//! tried by the stretch they give; new faces must be good in the first rounds and less so in later ones; flips within
-//! planes come first, and needles that no collapse removes get new vertices. The paper does not keep the topology and
-//! bounds only the error of projections.
+//! Beyond these: on real tessellations the paper's trials nearly always fail, because a neighbourhood takes in what
+//! lies beside the fillet and merged vertices tell little of it, so fillets are recognised first; smooth borders of
+//! flat faces are curves; when the shortest side may not go, the next one below the same length may; in the fourth case
+//! both kinds of fit are tried, the paper's first; positions beside the optimised one are tried by the stretch they
+//! give; new faces must be good in the first rounds and less so in later ones; flips within planes come first, and
+//! needles that no collapse removes get new vertices. The paper does not keep the topology and bounds only the error of
+//! projections.
 
 mod cases;
 mod insert;
