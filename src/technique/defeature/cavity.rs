@@ -17,7 +17,7 @@ pub(super) const ROUND: f64 = 0.05;
 pub(super) const PARALLEL: f64 = 0.99;
 pub(super) const CONCENTRIC: f64 = 0.05;
 /// A chamfer or countersink is at most this much wider than its hole.
-const WIDEST_CONE: f64 = 2.0;
+pub(super) const WIDEST_CONE: f64 = 2.0;
 /// A side up to this much wider than its hole is a step of it; a wider one is a pocket with a hole in its floor.
 pub(super) const WIDEST_STEP: f64 = 3.0;
 /// A floor lies within this much of its rim's radius.
@@ -61,6 +61,8 @@ enum Growth {
     Cavity(Cavity),
     /// A feature with a step that is too wide.
     TooWide,
+    /// One of the bores that cross.
+    Crossing,
     /// Nothing to be removed: a whole pin, a column between two faces.
     Nothing,
 }
@@ -99,6 +101,7 @@ impl<'a> Finder<'a> {
                 None => match self.grow(number as u32, ring) {
                     Growth::Cavity(cavity) => Ok(cavity),
                     Growth::TooWide => Err(Reason::StepTooLarge),
+                    Growth::Crossing => Err(Reason::CutByOthers),
                     Growth::Nothing => continue,
                 },
             };
@@ -146,6 +149,9 @@ impl<'a> Finder<'a> {
                 End::TooWide => return Growth::TooWide,
             }
         }
+        if rims.iter().any(|&rim| self.meets_bores(rim)) {
+            return Growth::Crossing;
+        }
         let kind = match (ring.facing, rims.len()) {
             (Facing::In, 2) => Kind::ThroughHoles,
             (Facing::In, 1) => Kind::BlindHoles,
@@ -156,6 +162,20 @@ impl<'a> Finder<'a> {
         let diameter = sides.map(Ring::diameter).fold(0.0, f64::max);
         let bores = vec![(ring.centre, diameter)];
         Growth::Cavity(Cavity { kind, patches, rims, axis: ring.axis, diameter, bores })
+    }
+
+    /// Whether several small bores begin at a rim: they cross, and filling it would leave the place where they do as a
+    /// void. What lies behind openings is taken out as a whole.
+    fn meets_bores(&self, (patch, rim): (u32, usize)) -> bool {
+        let beyond = self.patches.all[patch as usize].rims[rim].beyond.iter().flatten();
+        let mut bores: Vec<u32> = beyond.map(|&f| self.patches.of_face[f]).collect();
+        bores.sort_unstable();
+        bores.dedup();
+        let is_bore = |&p: &u32| {
+            let ring = self.rings[p as usize].as_ref();
+            ring.is_some_and(|r| r.form == Form::Side && r.facing == Facing::In && r.diameter() <= self.most)
+        };
+        bores.len() > 1 && bores.iter().all(is_bore)
     }
 
     /// Goes on over a rim as long as the feature does.

@@ -8,19 +8,22 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use glam::DVec3;
+use rustc_hash::FxHashSet;
 
-use super::cavity::{CONCENTRIC, Cavity, Found, PARALLEL, ROUND, WIDEST_FLOOR, WIDEST_STEP};
-use super::openings::{Opening, inwards, openings};
+use super::cavity::{CONCENTRIC, Cavity, Found, PARALLEL, ROUND, WIDEST_CONE, WIDEST_FLOOR, WIDEST_STEP};
+use super::openings::{Opening, Rims, inwards, openings};
 use super::patches::Patches;
-use super::round::circle;
+use super::round::{SIDE, circle};
 use super::{Kind, Reason, Rejected};
 use crate::mesh::geometry::centroid;
 use crate::mesh::id::{Edge, Face};
 use crate::mesh::topology::EdgeTable;
-use crate::mesh::{FaceId, IdVec, Surface, edge_key};
+use crate::mesh::{EdgeId, FaceId, IdVec, Surface, edge_key};
 
+/// Cosine by which the steepest face of a feature turns against its opening: 30 degrees.
+const STEEP: f64 = 0.866;
 /// How far above the plane of its rim a hole may reach, as a share of its width.
-const ABOVE: f64 = 0.05;
+const ABOVE: f64 = 0.15;
 /// Sine by which faces of a hole may turn away from its axis.
 const AWAY: f64 = 0.1;
 
@@ -45,8 +48,15 @@ impl<'a> Compounds<'a> {
         normals: &'a IdVec<Face, DVec3>,
         patches: &'a Patches,
         most: f64,
+        kind: Rims,
     ) -> Self {
-        let openings = openings(surface, normals, patches);
+        let mut openings = openings(surface, normals, patches, kind);
+        if kind == Rims::Any {
+            let sides = edges.edges_of_triangles(surface.faces.len());
+            for opening in openings.iter_mut().filter(|o| o.width <= WIDEST_CONE * most) {
+                opening.bore = bore(surface, edges, &sides, normals, opening);
+            }
+        }
         let mut is_cut: IdVec<Edge, bool> = IdVec::filled(false, edges.len());
         for opening in &openings {
             let rim = &patches.all[opening.patch as usize].rims[opening.rim].vertices;
@@ -75,8 +85,8 @@ impl<'a> Compounds<'a> {
                 if o.is_hole { holes } else { kinds.contains(&Kind::Bosses) }
             };
             let small: Vec<&Opening> =
-                openings.iter().copied().filter(|o| o.width <= self.most && is_wanted(o)).collect();
-            if small.is_empty() {
+                openings.iter().copied().filter(|o| o.bore <= self.most && is_wanted(o)).collect();
+            if small.is_empty() || !self.is_steep(piece, &openings) {
                 continue;
             }
             match self.refusal(piece, &openings) {
@@ -95,7 +105,7 @@ impl<'a> Compounds<'a> {
         let is_alone = !self.hosts.contains(&piece)
             && self.pieces.all[piece as usize].rims.len() == openings.len()
             && openings.iter().all(|o| o.is_hole == openings[0].is_hole);
-        if openings.iter().any(|o| o.width > self.most) {
+        if openings.iter().any(|o| o.bore > self.most) {
             Some(Reason::OpensWider)
         } else if openings.iter().any(|o| !o.is_round) {
             Some(Reason::NotRound)
@@ -108,6 +118,12 @@ impl<'a> Compounds<'a> {
             let is_inside = faces.iter().all(|&f| openings.iter().any(|o| self.is_bore_of(f, o)));
             (!is_inside).then_some(Reason::OpensWider)
         }
+    }
+
+    /// Whether anything of a piece stands up against its openings: a lid over a rim is no feature.
+    fn is_steep(&self, piece: u32, openings: &[&Opening]) -> bool {
+        let turns = |f: &FaceId| self.normals[*f].dot(openings[0].normal).abs() < STEEP;
+        self.pieces.all[piece as usize].faces.iter().any(turns)
     }
 
     /// Whether the face round an opening is the step of a wider hole that stays.
@@ -143,6 +159,35 @@ impl<'a> Compounds<'a> {
     }
 }
 
+/// The width of the side behind an opening, which a rounding or a chamfer may part from it; the opening's own where there
+/// is no side, or a funnel leads to it.
+fn bore(
+    surface: &Surface,
+    edges: &EdgeTable,
+    sides: &IdVec<Face, [EdgeId; 3]>,
+    normals: &IdVec<Face, DVec3>,
+    opening: &Opening,
+) -> f64 {
+    let aside = |p: DVec3| {
+        let off = p - opening.centre;
+        (off - opening.normal * off.dot(opening.normal)).length()
+    };
+    let is_near = |f: FaceId| surface.corners(f).into_iter().all(|p| aside(p) <= 0.5 * WIDEST_FLOOR * opening.width);
+    let mut faces = opening.behind.clone();
+    let mut seen: FxHashSet<FaceId> = faces.iter().copied().collect();
+    let mut widest = 0.0_f64;
+    while let Some(f) = faces.pop() {
+        if normals[f].dot(opening.normal).abs() < SIDE {
+            widest = surface.corners(f).into_iter().map(aside).fold(widest, f64::max);
+            continue;
+        }
+        let beyond = sides[f].into_iter().flat_map(|e| edges.sides(e)).map(|side| side.face);
+        faces.extend(beyond.filter(|&g| is_near(g) && seen.insert(g)));
+    }
+    let is_rim_of_it = opening.width <= WIDEST_CONE * 2.0 * widest;
+    if is_rim_of_it { opening.width.min(2.0 * widest) } else { opening.width }
+}
+
 /// Openings on the same axis, by the first of each.
 fn bores<'o>(openings: &[&'o Opening]) -> Vec<Vec<&'o Opening>> {
     let mut bores: Vec<Vec<&Opening>> = Vec::new();
@@ -165,7 +210,7 @@ fn middle(openings: &[&Opening]) -> DVec3 {
 }
 
 fn widest(openings: &[&Opening]) -> f64 {
-    openings.iter().map(|o| o.width).fold(0.0, f64::max)
+    openings.iter().map(|o| o.bore).fold(0.0, f64::max)
 }
 
 fn rejected(bore: &[&Opening], reason: Reason) -> (Vec<FaceId>, Rejected) {
@@ -182,7 +227,7 @@ fn cavity(piece: u32, openings: &[&Opening]) -> Option<Cavity> {
         (false, _) => return None,
     };
     let diameter = widest(openings);
-    let axis = openings.iter().find(|o| o.width >= diameter)?.normal;
+    let axis = openings.iter().find(|o| o.bore >= diameter)?.normal;
     let bores = bores(openings).iter().map(|bore| (middle(bore), widest(bore))).collect();
     let rims = (0..openings.len()).map(|rim| (piece, rim)).collect();
     Some(Cavity { kind, patches: vec![piece], rims, axis, diameter, bores })

@@ -3,7 +3,6 @@
 use std::ops::ControlFlow;
 
 use glam::DVec3;
-use rustc_hash::FxHashSet;
 
 use crate::mesh::bvh::{Primitive, TriangleBvh};
 use crate::mesh::geometry::{Aabb, area_vector};
@@ -65,7 +64,7 @@ impl Fill {
         surface: &Surface,
         rim: Vec<VertexId>,
         beside: Vec<FaceId>,
-        taken: &FxHashSet<EdgeKey>,
+        is_taken: &dyn Fn(EdgeKey) -> bool,
     ) -> Option<Self> {
         let points: Vec<DVec3> = rim.iter().map(|&v| surface.points[v]).collect();
         let normal = |&f: &FaceId| {
@@ -73,7 +72,7 @@ impl Fill {
             (b - a).cross(c - a).normalize_or_zero()
         };
         let normals: Vec<DVec3> = beside.iter().map(normal).collect();
-        let is_free = |i: usize, k: usize| !taken.contains(&edge_key(rim[i], rim[k]));
+        let is_free = |i: usize, k: usize| !is_taken(edge_key(rim[i], rim[k]));
         if points.len() < 3 {
             return None;
         }

@@ -9,7 +9,9 @@
 //!
 //! When no ring between marks is left, edges that are sharp without a mark cut as well, because marks leave gaps where
 //! rims nearly touch; then what lies behind the openings of flat faces is looked at as a whole (see `compound`), which
-//! finds bores that cross. What stays is listed once, by the first search that came upon it.
+//! finds bores that cross, and once more with the openings that a rounding has left without a sharp edge. What stays is
+//! listed once, by the first search that came upon it; the pieces of bores and bosses that break out at their side come
+//! last (see `open_side`).
 //!
 //! Based on: H. Date, S. Kanai, T. Kishinami, I. Nishigaki, T. Dohi. *High-Quality and Property Controlled Finite Element
 //! Mesh Generation From Triangular Meshes using the Multiresolution Technique*, JCISE 5(4), 2005, section 6.3.2.
@@ -45,15 +47,16 @@ use crate::mesh::topology::EdgeTable;
 use crate::mesh::{FaceId, FreedomError, IdVec, LockRules, Surface};
 use crate::technique::feature::reliable_normals;
 use crate::watch::{Cancelled, Watch};
-use cavity::{Finder, Found};
+use cavity::{Cavity, Finder, Found};
 use compound::Compounds;
-use open_side::open_sided;
+use open_side::OpenSides;
+use openings::Rims;
 use patches::Patches;
 use rebuild::rebuild;
 use surgery::Surgery;
 
-/// Rounds at most: each removes what the round before has laid open.
-const MOST_ROUNDS: usize = 8;
+/// Rounds at most: each removes what the round before has laid open, one storey of a stack of bosses at least.
+const MOST_ROUNDS: usize = 100;
 
 /// Sorts of features.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
@@ -181,11 +184,12 @@ pub fn remove_features(
     let wishes = Wishes { most, kinds, mean_size: sizes / surface.faces.len().max(1) as f64, locks };
     let mut report = Report::default();
     let mut current = surface.clone();
+    let mut is_fill = IdVec::filled(false, current.faces.len());
     for _ in 0..MOST_ROUNDS {
         watch.check()?;
         report.rejected.clear();
         let known = IdVec::filled(None, current.faces.len());
-        let mut round = Round { surface: &current, wishes, known, report: &mut report };
+        let mut round = Round { surface: &current, wishes, known, is_fill: &mut is_fill, report: &mut report };
         let Some(next) = round.run(watch)? else { break };
         current = next;
     }
@@ -208,11 +212,14 @@ struct Round<'a> {
     wishes: Wishes<'a>,
     /// Why the feature stays that a face is known to belong to.
     known: IdVec<Face, Option<Reason>>,
+    /// What earlier rounds filled in: a fill that bulges is no feature, or it would be replaced for ever.
+    is_fill: &'a mut IdVec<Face, bool>,
     report: &'a mut Report,
 }
 
 impl Round<'_> {
-    /// The surface without what was found first: by marks; by sharp edges, where marks have gaps; behind openings.
+    /// The surface without what was found first: by marks; by sharp edges, where marks have gaps; behind sharp openings;
+    /// behind rounded ones.
     fn run(&mut self, watch: &Watch) -> Result<Option<Surface>, DefeatureError> {
         let Wishes { most, kinds, .. } = self.wishes;
         let edges = EdgeTable::new(self.surface);
@@ -232,14 +239,19 @@ impl Round<'_> {
                 return Ok(Some(next));
             }
         }
-        let compounds = Compounds::new(self.surface, &edges, &normals, &patches, most);
-        let next = self.operate(&compounds.pieces, compounds.find(kinds), watch)?;
-        if next.is_none() && (kinds.contains(&Kind::ThroughHoles) || kinds.contains(&Kind::BlindHoles)) {
-            for (faces, rejected) in open_sided(self.surface, &patches, most) {
-                self.reject(&faces, vec![rejected]);
-            }
+        let compounds = Compounds::new(self.surface, &edges, &normals, &patches, most, Rims::Sharp);
+        if let Some(next) = self.operate(&compounds.pieces, compounds.find(kinds), watch)? {
+            return Ok(Some(next));
         }
-        Ok(next)
+        let flat = Patches::new(self.surface, &edges, &patches::bent(&edges, &normals));
+        let compounds = Compounds::new(self.surface, &edges, &normals, &flat, most, Rims::Any);
+        if let Some(next) = self.operate(&compounds.pieces, compounds.find(kinds), watch)? {
+            return Ok(Some(next));
+        }
+        for (faces, rejected) in OpenSides::new(self.surface, &edges, &normals, &patches).find(most, kinds) {
+            self.reject(&faces, vec![rejected]);
+        }
+        Ok(None)
     }
 
     /// Notes what stays and removes the rest; `None` where nothing could be removed.
@@ -255,27 +267,48 @@ impl Round<'_> {
         watch.phase("removing features", Some(found.cavities.len() as u64));
         for (i, cavity) in found.cavities.iter().enumerate() {
             watch.check()?;
-            let faces: Vec<FaceId> =
-                cavity.patches.iter().flat_map(|&p| &patches.all[p as usize].faces).copied().collect();
-            let why = |reason: Reason| {
-                let of = |&(centre, diameter): &(DVec3, f64)| Rejected { centre, diameter, reason };
-                cavity.bores.iter().map(of).collect::<Vec<_>>()
-            };
-            if faces.iter().any(|&f| self.known[f].is_some_and(Reason::is_final)) {
-                if cavity.bores.len() > 1 {
-                    let rest: Vec<FaceId> = faces.into_iter().filter(|&f| self.known[f].is_none()).collect();
-                    self.reject(&rest, why(Reason::CutByOthers));
-                }
-                continue;
-            }
-            match surgery.remove(cavity, self.wishes.mean_size, watch)? {
-                Ok(removed) => self.report.removed.push(removed),
-                Err(reason) => self.reject(&faces, why(reason)),
-            }
+            self.take_out(&mut surgery, patches, cavity, watch)?;
             watch.advance(i as u64 + 1, || format!("{} removed", self.report.removed.len()));
         }
-        let is_any = self.report.removed.len() > before;
-        Ok(is_any.then(|| rebuild(self.surface, &surgery.goes, &surgery.fills, &surgery.tree)))
+        if self.report.removed.len() == before {
+            return Ok(None);
+        }
+        let next = rebuild(self.surface, &surgery.goes, &surgery.fills, &surgery.tree);
+        let old = self.surface.faces.ids().filter(|&f| !surgery.goes[f]).map(|f| self.is_fill[f]);
+        // What was filled in comes after all faces that stay.
+        let is_fill = old.chain(std::iter::repeat(true)).take(next.faces.len()).collect();
+        *self.is_fill = is_fill;
+        Ok(Some(next))
+    }
+
+    /// Removes one feature, or notes why it stays.
+    fn take_out(
+        &mut self,
+        surgery: &mut Surgery<'_>,
+        patches: &Patches,
+        cavity: &Cavity,
+        watch: &Watch,
+    ) -> Result<(), Cancelled> {
+        let faces: Vec<FaceId> = cavity.patches.iter().flat_map(|&p| &patches.all[p as usize].faces).copied().collect();
+        let why = |reason: Reason| {
+            let of = |&(centre, diameter): &(DVec3, f64)| Rejected { centre, diameter, reason };
+            cavity.bores.iter().map(of).collect::<Vec<_>>()
+        };
+        if faces.iter().all(|&f| self.is_fill[f]) {
+            return Ok(());
+        }
+        if faces.iter().any(|&f| self.known[f].is_some_and(Reason::is_final)) {
+            if cavity.bores.len() > 1 {
+                let rest: Vec<FaceId> = faces.into_iter().filter(|&f| self.known[f].is_none()).collect();
+                self.reject(&rest, why(Reason::CutByOthers));
+            }
+            return Ok(());
+        }
+        match surgery.remove(cavity, self.wishes.mean_size, watch)? {
+            Ok(removed) => self.report.removed.push(removed),
+            Err(reason) => self.reject(&faces, why(reason)),
+        }
+        Ok(())
     }
 
     /// Lists the bores of a feature that stays, unless it is listed already.

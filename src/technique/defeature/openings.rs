@@ -11,12 +11,13 @@ use super::round::{circle, unroundness};
 use crate::mesh::id::Face;
 use crate::mesh::{FaceId, IdVec, Surface};
 
-/// Cosine between the rim's plane and the faces round it, at most 25 degrees.
-const FLAT: f64 = 0.9;
+/// Cosine between the rim's plane and the faces round it: at most 37 degrees where the rim is sharp, as on a shaft of 1.7
+/// times the bore; 1 degree else, because the strips of a rounding have smooth rims as well.
+const FLAT: [f64; 2] = [0.8, 0.99985];
 /// A rim is sharp where the cosine between the faces on both sides is less: 20 degrees.
 const SHARP: f64 = 0.94;
 /// How far a rim may leave its plane, as a share of its radius.
-const UNEVEN: f64 = 0.05;
+const UNEVEN: f64 = 0.25;
 /// Directions in which the width of a rim that is not round is looked at.
 const DIRECTIONS: usize = 64;
 
@@ -33,17 +34,28 @@ pub(super) struct Opening {
     pub(super) normal: DVec3,
     /// The diameter of a round one, else the narrowest width.
     pub(super) width: f64,
+    /// The width that counts: that of the side beyond a rounded rim.
+    pub(super) bore: f64,
     pub(super) is_round: bool,
     /// Whether what lies beyond the rim faces inwards: a hole, no boss.
     pub(super) is_hole: bool,
 }
 
+/// Which rims count as openings.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Rims {
+    /// Those that are sharp all round.
+    Sharp,
+    /// The smooth ends of roundings too.
+    Any,
+}
+
 /// All openings of the patches.
-pub(super) fn openings(surface: &Surface, normals: &IdVec<Face, DVec3>, patches: &Patches) -> Vec<Opening> {
+pub(super) fn openings(surface: &Surface, normals: &IdVec<Face, DVec3>, patches: &Patches, kind: Rims) -> Vec<Opening> {
     let mut found = Vec::new();
     for (number, patch) in patches.all.iter().enumerate() {
         let rims = patch.rims.iter().enumerate();
-        found.extend(rims.filter_map(|(k, rim)| opening(surface, normals, (number as u32, k), rim)));
+        found.extend(rims.filter_map(|(k, rim)| opening(surface, normals, (number as u32, k), rim, kind)));
     }
     found
 }
@@ -53,13 +65,15 @@ fn opening(
     normals: &IdVec<Face, DVec3>,
     (patch, number): (u32, usize),
     rim: &Rim,
+    kind: Rims,
 ) -> Option<Opening> {
     let behind: Vec<FaceId> = rim.beyond.iter().copied().collect::<Option<_>>()?;
     // A rim from inside runs against the face that it lies in.
     let normal = -around(surface, rim).try_normalize()?;
-    let is_flat = rim.own.iter().all(|&f| normals[f] == DVec3::ZERO || normals[f].dot(normal) >= FLAT);
+    let flat = if kind == Rims::Sharp { FLAT[0] } else { FLAT[1] };
+    let is_flat = rim.own.iter().all(|&f| normals[f] == DVec3::ZERO || normals[f].dot(normal) >= flat);
     let is_sharp = rim.own.iter().zip(&behind).all(|(&f, &g)| normals[f].dot(normals[g]) < SHARP);
-    if !is_flat || !is_sharp {
+    if !is_flat || (kind == Rims::Sharp && !is_sharp) {
         return None;
     }
     let circle = circle(surface, rim, normal);
@@ -68,9 +82,13 @@ fn opening(
         return None;
     }
     let is_round = unroundness(surface, rim, circle.centre, normal) <= ROUND;
+    if !is_sharp && !is_round {
+        // What noise bounds.
+        return None;
+    }
     let width = if is_round { 2.0 * circle.radius } else { narrowest(surface, rim, normal) };
     let is_hole = inwards(surface, normals, rim, circle.centre, normal) > 0.0;
-    Some(Opening { patch, rim: number, behind, centre: circle.centre, normal, width, is_round, is_hole })
+    Some(Opening { patch, rim: number, behind, centre: circle.centre, normal, width, bore: width, is_round, is_hole })
 }
 
 /// Twice the area vector of a rim.

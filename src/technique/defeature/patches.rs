@@ -13,6 +13,8 @@ use crate::mesh::{EdgeId, EdgeKey, FaceId, IdVec, MarkCause, Surface, VertexId};
 
 /// An unmarked edge is sharp from this angle between the normals on, in degrees: what marks are given for by default.
 const SHARP: f64 = 30.0;
+/// Faces that turn by less than this are flat, in degrees: below the first step of a rounding, above rounded coordinates.
+const BENT: f64 = 1.0;
 
 /// The marked edges.
 pub(super) fn marked(surface: &Surface, edges: &EdgeTable) -> IdVec<Edge, bool> {
@@ -34,6 +36,15 @@ pub(super) fn sharp(surface: &Surface, edges: &EdgeTable, normals: &IdVec<Face, 
     Some(edges.iter().map(|(_, key, sides)| is_marked(&key) || is_sharp(sides)).collect())
 }
 
+/// The edges at which faces turn at all: what they bound is flat, and ends where a rounding begins.
+pub(super) fn bent(edges: &EdgeTable, normals: &IdVec<Face, DVec3>) -> IdVec<Edge, bool> {
+    let is_bent = |sides: &[SideRef]| match sides {
+        [a, b] => angle(normals[a.face], normals[b.face]).to_degrees() >= BENT,
+        _ => true,
+    };
+    edges.iter().map(|(_, _, sides)| is_bent(sides)).collect()
+}
+
 /// One closed chain of edges round a patch.
 #[derive(Clone, Debug)]
 pub(super) struct Rim {
@@ -51,6 +62,8 @@ pub(super) struct Patch {
     pub(super) faces: Vec<FaceId>,
     /// Empty where rims touch each other or themselves at a vertex.
     pub(super) rims: Vec<Rim>,
+    /// The rim that each vertex of one lies on, sorted.
+    rim_of: Vec<(VertexId, usize)>,
     /// Euler characteristic.
     pub(super) characteristic: i64,
 }
@@ -88,7 +101,7 @@ impl Patches {
                 }
             }
             faces.sort_unstable();
-            all.push(Patch { faces, rims: Vec::new(), characteristic: 0 });
+            all.push(Patch { faces, rims: Vec::new(), rim_of: Vec::new(), characteristic: 0 });
         }
         let mut this = Self { of_face, all };
         for number in 0..this.all.len() {
@@ -121,6 +134,9 @@ impl Patches {
         is_pinched |= out.windows(2).any(|pair| pair[0].0 == pair[1].0);
         let rims = if is_pinched { Vec::new() } else { chains(&out) };
         self.all[number].characteristic = count;
+        let on = rims.iter().enumerate().flat_map(|(k, rim)| rim.vertices.iter().map(move |&v| (v, k)));
+        self.all[number].rim_of = on.collect();
+        self.all[number].rim_of.sort_unstable();
         self.all[number].rims = rims;
     }
 
@@ -130,9 +146,10 @@ impl Patches {
         if rim.beyond.iter().any(|f| f.is_none_or(|f| self.of_face[f] != first)) {
             return None;
         }
-        let start = rim.vertices[0];
-        let same = |other: &Rim| other.vertices.len() == rim.vertices.len() && other.vertices.contains(&start);
-        self.all[first as usize].rims.iter().position(same).map(|at| (first, at))
+        let patch = &self.all[first as usize];
+        let found = patch.rim_of.binary_search_by_key(rim.vertices.first()?, |&(v, _)| v).ok()?;
+        let at = patch.rim_of[found].1;
+        (patch.rims[at].vertices.len() == rim.vertices.len()).then_some((first, at))
     }
 }
 

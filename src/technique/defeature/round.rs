@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use super::patches::{Patch, Rim};
 use crate::mesh::geometry::{area_vector, centroid};
-use crate::mesh::{FaceId, Surface};
+use crate::mesh::{FaceId, Surface, VertexId};
 use crate::technique::eigen::symmetric_eigen;
 
 /// A circle in space.
@@ -61,7 +61,7 @@ impl Ring {
 }
 
 /// Normals turned by less than this against the plane across the axis belong to a side: 17 degrees.
-const SIDE: f64 = 0.3;
+pub(super) const SIDE: f64 = 0.3;
 /// Normals nearer to the axis than this belong to a step: 18 degrees.
 const STEP: f64 = 0.95;
 
@@ -93,11 +93,23 @@ fn axis(normals: &[(DVec3, f64, DVec3)]) -> Option<DVec3> {
     if largest < 0.01 { mean.try_normalize() } else { Some(least) }
 }
 
-/// Describes a patch with rims; `None` without rims or area.
+/// Describes a patch by its rims; `None` without rims or area.
 pub(super) fn ring(surface: &Surface, patch: &Patch) -> Option<Ring> {
+    described(surface, patch, |axis| patch.rims.iter().map(|rim| circle(surface, rim, axis)).collect())
+}
+
+/// Describes a patch by the one circle through all its vertices, whatever its rims are.
+pub(super) fn barrel(surface: &Surface, patch: &Patch) -> Option<Ring> {
+    let mut vertices: Vec<VertexId> = patch.faces.iter().flat_map(|&f| surface.faces[f]).collect();
+    vertices.sort_unstable();
+    vertices.dedup();
+    described(surface, patch, |axis| vec![circle_of(vertices.iter().map(|&v| surface.points[v]).collect(), axis)])
+}
+
+fn described(surface: &Surface, patch: &Patch, circles: impl FnOnce(DVec3) -> Vec<Circle>) -> Option<Ring> {
     let normals = normals(surface, &patch.faces);
     let axis = axis(&normals)?;
-    let circles: Vec<Circle> = patch.rims.iter().map(|rim| circle(surface, rim, axis)).collect();
+    let circles = circles(axis);
     if circles.is_empty() {
         return None;
     }
@@ -141,10 +153,14 @@ pub(super) fn unroundness(surface: &Surface, rim: &Rim, centre: DVec3, axis: DVe
     if most > 0.0 { 1.0 - least / most } else { f64::INFINITY }
 }
 
-/// The circle nearest to a rim seen along the axis (Kåsa's linear least squares).
+/// The circle nearest to a rim seen along the axis.
 pub(super) fn circle(surface: &Surface, rim: &Rim, axis: DVec3) -> Circle {
+    circle_of(rim.vertices.iter().map(|&w| surface.points[w]).collect(), axis)
+}
+
+/// The circle nearest to points seen along the axis (Kåsa's linear least squares).
+fn circle_of(points: Vec<DVec3>, axis: DVec3) -> Circle {
     let (u, v) = axis.any_orthonormal_pair();
-    let points: Vec<DVec3> = rim.vertices.iter().map(|&w| surface.points[w]).collect();
     let count = points.len() as f64;
     let mean = points.iter().sum::<DVec3>() / count;
     let flat: Vec<(f64, f64)> = points.iter().map(|&p| ((p - mean).dot(u), (p - mean).dot(v))).collect();

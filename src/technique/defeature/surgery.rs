@@ -10,6 +10,7 @@ use super::fill::Fill;
 use super::patches::Patches;
 use super::{Reason, Removed};
 use crate::mesh::bvh::TriangleBvh;
+use crate::mesh::geometry::Aabb;
 use crate::mesh::id::{Face, Vertex};
 use crate::mesh::topology::VertexFaces;
 use crate::mesh::{EdgeKey, FaceId, Freedom, FreedomError, IdVec, LockRules, MarkCause, Rim, Surface, VertexId};
@@ -25,10 +26,10 @@ pub(super) struct Surgery<'a> {
     freedom: IdVec<Vertex, Freedom>,
     pub(super) goes: IdVec<Face, bool>,
     pub(super) fills: Vec<Fill>,
-    /// The triangles of all fills.
-    filled: Vec<[DVec3; 3]>,
+    /// The triangles of each fill.
+    filled: Vec<Filled>,
     /// Their edges between rim vertices.
-    taken: BTreeSet<EdgeKey>,
+    taken: FxHashSet<EdgeKey>,
 }
 
 impl<'a> Surgery<'a> {
@@ -42,7 +43,7 @@ impl<'a> Surgery<'a> {
             goes: IdVec::filled(false, surface.faces.len()),
             fills: Vec::new(),
             filled: Vec::new(),
-            taken: BTreeSet::new(),
+            taken: FxHashSet::default(),
         })
     }
 
@@ -63,10 +64,8 @@ impl<'a> Surgery<'a> {
         let mut fills: Vec<Fill> = Vec::new();
         for &(patch, rim) in &cavity.rims {
             let Some(coarse) = self.coarse(patch, rim, &goes, &fills) else { return Ok(Err(Reason::NoFill)) };
-            let others: Vec<[DVec3; 3]> =
-                fills.iter().flat_map(|f| f.corners(self.surface)).chain(self.filled.iter().copied()).collect();
-            let stays = |f: FaceId| !self.goes[f] && !goes.contains(&f);
-            let is_harmless = |fill: &Fill| !fill.meets(self.surface, &self.tree, stays, &others);
+            let own: Vec<Filled> = fills.iter().map(|fill| Filled::new(fill.corners(self.surface))).collect();
+            let is_harmless = |fill: &Fill| !self.meets(fill, &goes, &own);
             let fine = coarse.improved(self.surface, mean_size, watch)?;
             let Some(fill) = fine.into_iter().chain([coarse]).find(is_harmless) else {
                 return Ok(Err(Reason::Obstructed));
@@ -89,17 +88,33 @@ impl<'a> Surgery<'a> {
             self.goes[f] = true;
         }
         for fill in fills {
-            self.filled.extend(fill.corners(self.surface));
+            self.filled.push(Filled::new(fill.corners(self.surface)));
             self.taken.extend(fill.rim_edges());
             self.fills.push(fill);
         }
         Ok(Ok(removed))
     }
 
-    /// The mean of a rim's vertices.
+    /// Whether a fill meets itself, a face that stays or another fill, of which only those nearby are looked at.
+    fn meets(&self, fill: &Fill, goes: &FxHashSet<FaceId>, own: &[Filled]) -> bool {
+        let stays = |f: FaceId| !self.goes[f] && !goes.contains(&f);
+        let bounds = Aabb::of(fill.corners(self.surface).into_iter().flatten());
+        let near = self.filled.iter().chain(own).filter(|other| other.bounds.overlaps(&bounds));
+        let others: Vec<[DVec3; 3]> = near.flat_map(|other| &other.corners).copied().collect();
+        fill.meets(self.surface, &self.tree, stays, &others)
+    }
+
+    /// The middle of a rim's line, so that it does not depend on how the line is divided.
     fn centre(&self, patch: u32, rim: usize) -> DVec3 {
         let rim = &self.patches.all[patch as usize].rims[rim].vertices;
-        rim.iter().map(|&v| self.surface.points[v]).sum::<DVec3>() / rim.len().max(1) as f64
+        let at = |i: usize| self.surface.points[rim[i % rim.len()]];
+        let (mut sum, mut length) = (DVec3::ZERO, 0.0);
+        for i in 0..rim.len() {
+            let along = at(i).distance(at(i + 1));
+            sum += 0.5 * along * (at(i) - at(0) + at(i + 1) - at(0));
+            length += along;
+        }
+        if length > 0.0 { at(0) + sum / length } else { at(0) }
     }
 
     fn coarse(&self, patch: u32, rim: usize, goes: &FxHashSet<FaceId>, before: &[Fill]) -> Option<Fill> {
@@ -113,13 +128,25 @@ impl<'a> Surgery<'a> {
         if beside.iter().any(|f| goes.contains(f)) {
             return None;
         }
-        let mut taken: FxHashSet<EdgeKey> = self.taken.iter().copied().collect();
-        taken.extend(before.iter().flat_map(Fill::rim_edges));
+        let mut near: FxHashSet<EdgeKey> = before.iter().flat_map(Fill::rim_edges).collect();
         for f in vertices.iter().flat_map(|&v| self.fans.of(v)).filter(|f| !goes.contains(f)) {
             let [a, b, c] = self.surface.faces[*f];
-            taken.extend([edge_key(a, b), edge_key(b, c), edge_key(c, a)]);
+            near.extend([edge_key(a, b), edge_key(b, c), edge_key(c, a)]);
         }
-        Fill::coarse(self.surface, vertices, beside, &taken)
+        Fill::coarse(self.surface, vertices, beside, &|edge| near.contains(&edge) || self.taken.contains(&edge))
+    }
+}
+
+/// The triangles of a fill with their bounds.
+struct Filled {
+    corners: Vec<[DVec3; 3]>,
+    bounds: Aabb,
+}
+
+impl Filled {
+    fn new(corners: Vec<[DVec3; 3]>) -> Self {
+        let bounds = Aabb::of(corners.iter().flatten().copied());
+        Self { corners, bounds }
     }
 }
 

@@ -1,5 +1,7 @@
 //! Known answers: a plate with holes, stepped and blind ones, slots, bosses, locks.
 
+mod rims;
+
 use std::f64::consts::TAU;
 
 use glam::DVec3;
