@@ -155,7 +155,7 @@ fn length_squared(bench: &Bench<'_, '_>, h: HalfedgeId) -> f64 {
 }
 
 /// Flips and relaxation that raise the quality: vertices in flat areas move within their plane, vertices on a fit along
-/// it, and no other one moves.
+/// it, and others to the nearest point of the reference.
 pub(super) fn polish(bench: &mut Bench<'_, '_>, rounds: usize, watch: &Watch) -> Result<(), Cancelled> {
     watch.phase("polish", Some(rounds as u64));
     for round in 0..rounds {
@@ -181,7 +181,7 @@ pub(super) fn polish(bench: &mut Bench<'_, '_>, rounds: usize, watch: &Watch) ->
 }
 
 /// Only between faces below this stretch is a flip worth its tests.
-const WORTH_A_FLIP: f64 = 0.6;
+const WORTH_A_FLIP: f64 = 0.85;
 
 fn flip(bench: &mut Bench<'_, '_>, e: EdgeId) -> bool {
     let mesh = bench.editor.mesh();
@@ -212,12 +212,14 @@ fn relax(bench: &mut Bench<'_, '_>, v: VertexId) -> bool {
     let step = centre / weight;
     let step = step - normal * normal.dot(step);
     let fit = bench.surfaces.of(v).copied();
-    if fit.is_none() && !is_flat(bench, v, normal) {
-        return false;
-    }
+    let is_flat = fit.is_none() && is_flat(bench, v, normal);
     [1.0, 0.5].into_iter().any(|share| {
         let wish = at + share * step;
-        let to = fit.map_or(Some(wish), |fit| fit.project(wish));
+        let to = match fit {
+            Some(fit) => fit.project(wish),
+            None if is_flat => Some(wish),
+            None => bench.editor.project(wish),
+        };
         to.is_some_and(|to| bench.editor.try_move(v, to, Gain::Quality))
     })
 }

@@ -226,7 +226,7 @@ const MOST_SEARCHES: usize = 3;
 const MOST_ENDINGS: usize = 3;
 
 /// Rounds of flips and relaxation at the end.
-const POLISH_ROUNDS: usize = 3;
+const POLISH_ROUNDS: usize = 8;
 
 /// Simplifies `input.surface`.
 ///
@@ -451,7 +451,7 @@ pub struct Step;
 
 impl crate::step::Step for Step {
     const NAME: &'static str = "simplify-fit";
-    const REVISION: u32 = 6;
+    const REVISION: u32 = 7;
     const INPUTS: &'static [InputDef] = &[
         InputDef { name: "from", accepts: &[Port::Surface], required: true, doc: "the surface to simplify" },
         InputDef {

@@ -10,7 +10,7 @@
 use glam::DVec3;
 
 use super::clip::{self, Convex};
-use super::envelope::Triangle;
+use super::envelope::{Change, Triangle};
 use super::target::{Target, find_owner, is_near_any, nearest};
 use crate::mesh::bvh::TriangleBvh;
 use crate::mesh::geometry::closest_on_triangle;
@@ -21,6 +21,10 @@ const NONE: u32 = u32::MAX;
 
 /// Parts that one check may look at before it gives up and refuses the edit.
 const CHECK_BUDGET: usize = 3000;
+
+/// And for each piece where the surface stays as it is: then owners are there, and the face of a long strip may own
+/// thousands of pieces.
+const SAME_BUDGET: usize = 16;
 
 /// How near the pieces' owners must be, and how small parts may become.
 #[derive(Clone, Copy, Debug)]
@@ -184,15 +188,16 @@ impl<'a> Cover<'a> {
     }
 
     /// Whether every piece of the old faces finds a new owner; on `true`, the owners wait for [`Cover::commit`].
-    pub(super) fn admits(&mut self, old: &[FaceId], new: &[Triangle], beside: &[Triangle], reach: Reach) -> bool {
+    pub(super) fn admits(&mut self, change: &Change<'_>, reach: Reach) -> bool {
         let mut plan = std::mem::take(&mut self.plan);
         let mut targets = std::mem::take(&mut self.targets);
         let mut found = std::mem::take(&mut self.found);
         plan.clear();
         targets.clear();
-        targets.extend(new.iter().chain(beside).map(|&face| Target::new(face, reach.reach)));
-        self.gather(old, &mut found);
-        let mut check = Check { targets: &targets, hint: 0, budget: CHECK_BUDGET };
+        targets.extend(change.new.iter().chain(change.beside).map(|&face| Target::new(face, reach.reach)));
+        self.gather(change.old, &mut found);
+        let budget = if change.is_same { CHECK_BUDGET.max(SAME_BUDGET * found.len()) } else { CHECK_BUDGET };
+        let mut check = Check { targets: &targets, hint: 0, budget };
         let covered =
             found.chunk_by(|a, b| a.0 == b.0).all(|same| self.find_owners(same, &mut check, &mut plan, reach));
         self.plan = plan;
@@ -369,4 +374,37 @@ fn covers(face: &Triangle, part: &[DVec3], reach: f64) -> bool {
 /// The triangles that a convex part falls into.
 fn fan(part: &[DVec3]) -> impl Iterator<Item = Triangle> + '_ {
     (2..part.len()).map(|at| [part[0], part[at - 1], part[at]])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::VertexId;
+    use crate::mesh::halfedge::tests::{enter, surface};
+
+    /// A sheet of needles from side to side, as a tessellation spans a fillet, and two triangles instead.
+    #[test]
+    fn the_owner_of_thousands_of_pieces_can_be_split() {
+        const NEEDLES: u32 = 3000;
+        let at =
+            |k: u32| [[0.0, f64::from(k) / f64::from(NEEDLES), 0.0], [10.0, f64::from(k) / f64::from(NEEDLES), 0.0]];
+        let points: Vec<[f64; 3]> = (0..=NEEDLES).flat_map(at).collect();
+        let needles = (0..NEEDLES).map(|k| 2 * k).flat_map(|k| [[k, k + 1, k + 3], [k, k + 3, k + 2]]);
+        let reference = surface(&points, &needles.collect::<Vec<_>>());
+        let coarse = surface(&[[0.0; 3], [10.0, 0.0, 0.0], [10.0, 1.0, 0.0], [0.0, 1.0, 0.0]], &[[0, 1, 2], [0, 2, 3]]);
+        let (mesh, own) = (enter(&coarse), TriangleBvh::of_surface(&coarse));
+        let reach = Reach { reach: 1e-3, finest: 1e-4 };
+        let mut cover = Cover::new(&reference, &mesh, &own, reach, 1e-3);
+        assert_eq!(cover.uncovered, 0);
+        let [a, b, c, d] = [0, 1, 2, 3].map(|v| coarse.points[VertexId::from_raw(v)]);
+        let middle = 0.5 * (a + c);
+        let old: Vec<FaceId> = mesh.faces().collect();
+        let was: Vec<Triangle> = old.iter().map(|&f| mesh.corner_points(f)).collect();
+        let new = [[a, b, middle], [b, c, middle], [c, d, middle], [d, a, middle]];
+        let change = Change { old: &old, was: &was, new: &new, beside: &[], is_same: true };
+        assert!(!cover.admits(&Change { new: &new[..3], ..change }, reach), "a quarter is left out");
+        assert!(cover.admits(&change, reach));
+        cover.commit(&old, &[0, 1, 2, 3].map(FaceId::from_raw));
+        assert!(cover.pieces.len() - cover.free.len() > CHECK_BUDGET);
+    }
 }

@@ -151,6 +151,11 @@ impl<'a> Editor<'a> {
         &self.mesh
     }
 
+    /// See [`Keeper::project`].
+    pub fn project(&self, p: DVec3) -> Option<DVec3> {
+        self.keeper.project(p)
+    }
+
     /// What was done so far.
     pub fn counts(&self) -> Counts {
         self.counts

@@ -192,7 +192,7 @@ impl<'a> Envelope<'a> {
         };
         (self.known, self.found) = (known, found);
         let reach = Reach { reach: self.reach, finest: self.finest };
-        is_near && self.cover.admits(change.old, change.new, change.beside, reach)
+        is_near && self.cover.admits(change, reach)
     }
 
     /// Whether the faces of the last edit tested were seen not to meet each other but where they touch.
