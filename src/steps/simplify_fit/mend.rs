@@ -8,12 +8,15 @@ use glam::DVec3;
 
 use super::cases::Bench;
 use super::insert::insert;
-use crate::mesh::geometry::{angle, area_vector, triangle_area};
-use crate::mesh::halfedge::{edge_of, twin};
+use super::surfaces::Surfaces;
+use crate::mesh::geometry::angle;
+use crate::mesh::halfedge::{HalfedgeMesh, edge_of};
 use crate::mesh::{EdgeId, FaceId, Freedom, HalfedgeId, VertexId};
 use crate::technique::collapse::session::best_stretch_at;
-use crate::technique::collapse::{CollapseRules, Order, Priority};
-use crate::technique::remesh::{Gain, faces_below, raise_stretch};
+use crate::technique::collapse::{CollapseRules, Editor, Order, Priority};
+use crate::technique::remesh::{
+    Gain, Refusals, faces_below, flip_edges, raise_stretch, relax_vertices, towards_centroid,
+};
 use crate::watch::{Cancelled, Watch};
 
 /// Edits at one face in one round.
@@ -154,79 +157,63 @@ fn length_squared(bench: &Bench<'_, '_>, h: HalfedgeId) -> f64 {
     mesh.point(mesh.origin(h)).distance_squared(mesh.point(mesh.target(h)))
 }
 
-/// Flips and relaxation that raise the quality: vertices in flat areas move within their plane, vertices on a fit along
-/// it, and others to the nearest point of the reference.
-pub(super) fn polish(bench: &mut Bench<'_, '_>, rounds: usize, watch: &Watch) -> Result<(), Cancelled> {
+/// Flips and relaxation that raise the quality, past what was refused before: vertices in flat areas move within their
+/// plane, vertices on a fit along it, and others to the nearest point of the reference.
+pub(super) fn polish(
+    bench: &mut Bench<'_, '_>,
+    rounds: usize,
+    refusals: &mut Refusals,
+    watch: &Watch,
+) -> Result<(), Cancelled> {
     watch.phase("polish", Some(rounds as u64));
+    let Bench { editor, surfaces, .. } = bench;
     for round in 0..rounds {
-        watch.advance(round as u64, || format!("{} faces", bench.editor.mesh().face_count()));
-        let mut edits = 0;
-        for e in (0..bench.editor.mesh().edge_slots()).map(EdgeId::new) {
-            if e.index().is_multiple_of(256) {
-                watch.check()?;
-            }
-            edits += usize::from(bench.editor.mesh().edge_is_live(e) && flip(bench, e));
-        }
-        for v in (0..bench.editor.mesh().vertex_slots()).map(VertexId::new) {
-            if v.index().is_multiple_of(256) {
-                watch.check()?;
-            }
-            edits += usize::from(bench.editor.mesh().vertex_is_live(v) && relax(bench, v));
-        }
-        if edits * 100 < bench.editor.mesh().vertex_count() {
+        watch.advance(round as u64, || format!("{} faces", editor.mesh().face_count()));
+        let flips = flip_edges(editor, refusals, watch)?;
+        let moves = relax_vertices(editor, refusals, watch, |editor, v| relax(editor, surfaces, v))?;
+        if (flips + moves) * 100 < editor.mesh().vertex_count() {
             break;
         }
     }
     Ok(())
 }
 
-/// Only between faces below this stretch is a flip worth its tests.
-const WORTH_A_FLIP: f64 = 0.85;
+/// Only vertices of faces below this stretch are worth a move.
+const WORTH_A_MOVE: f64 = 0.85;
 
-fn flip(bench: &mut Bench<'_, '_>, e: EdgeId) -> bool {
-    let mesh = bench.editor.mesh();
-    let h = crate::mesh::halfedge::halfedge_of(e);
-    let sides = [h, twin(h)].map(|h| mesh.face(h));
-    let is_poor = sides.into_iter().flatten().any(|f| bench.editor.stretch(f) < WORTH_A_FLIP);
-    is_poor && bench.editor.try_flip(e, Gain::LeastStretch)
-}
+/// And only by this part of their shortest edge, or more.
+const WORTH_A_STEP: f64 = 0.07;
 
 /// Towards the area-weighted centre of the star.
-fn relax(bench: &mut Bench<'_, '_>, v: VertexId) -> bool {
-    let mesh = bench.editor.mesh();
+fn relax(editor: &mut Editor<'_>, surfaces: &Surfaces, v: VertexId) -> bool {
+    let mesh = editor.mesh();
     if mesh.vertex_freedom(v) != Freedom::Free || mesh.is_boundary_vertex(v) {
         return false;
     }
-    let at = mesh.point(v);
-    let (mut centre, mut weight, mut normal) = (DVec3::ZERO, 0.0, DVec3::ZERO);
-    let mut is_poor = false;
-    for f in mesh.faces_around(v) {
-        let corners = mesh.corner_points(f);
-        let area = triangle_area(corners);
-        centre += area * ((corners[0] - at) + (corners[1] - at) + (corners[2] - at)) / 3.0;
-        weight += area;
-        normal += area_vector(corners);
-        is_poor |= bench.editor.stretch(f) < WORTH_A_FLIP;
+    if mesh.faces_around(v).all(|f| editor.stretch(f) >= WORTH_A_MOVE) {
+        return false;
     }
-    let Some(normal) = normal.try_normalize().filter(|_| is_poor && weight > 0.0) else { return false };
-    let step = centre / weight;
-    let step = step - normal * normal.dot(step);
-    let fit = bench.surfaces.of(v).copied();
-    let is_flat = fit.is_none() && is_flat(bench, v, normal);
+    let at = mesh.point(v);
+    let Some((step, normal)) = towards_centroid(mesh, v) else { return false };
+    let near = mesh.neighbours(v).map(|w| mesh.point(w).distance_squared(at)).fold(f64::INFINITY, f64::min);
+    if step.length_squared() < WORTH_A_STEP * WORTH_A_STEP * near {
+        return false;
+    }
+    let fit = surfaces.of(v);
+    let is_flat = fit.is_none() && is_flat(mesh, v, normal);
     [1.0, 0.5].into_iter().any(|share| {
         let wish = at + share * step;
         let to = match fit {
             Some(fit) => fit.project(wish),
             None if is_flat => Some(wish),
-            None => bench.editor.project(wish),
+            None => editor.project(wish),
         };
-        to.is_some_and(|to| bench.editor.try_move(v, to, Gain::Quality))
+        to.is_some_and(|to| editor.try_move(v, to, Gain::Quality))
     })
 }
 
 /// Whether the whole star lies in one plane.
-fn is_flat(bench: &Bench<'_, '_>, v: VertexId, normal: DVec3) -> bool {
-    let mesh = bench.editor.mesh();
+fn is_flat(mesh: &HalfedgeMesh, v: VertexId, normal: DVec3) -> bool {
     let at = mesh.point(v);
     mesh.neighbours(v).all(|w| {
         let along = mesh.point(w) - at;

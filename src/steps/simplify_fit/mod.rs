@@ -54,6 +54,7 @@ use crate::technique::collapse::session::{Setup, ToleranceMode, diagonal, open, 
 use crate::technique::collapse::{Editor, Limits, SizeField};
 use crate::technique::dispersion::Dispersion;
 use crate::technique::fit::regions::{Wanted, fit_regions};
+use crate::technique::remesh::Refusals;
 use crate::watch::{Cancelled, Watch};
 
 use cases::{Bench, Done};
@@ -326,10 +327,11 @@ fn run(
 /// What the loop of the paper leaves: faces above the target, poor shapes, and single faces above the aspect ratio.
 fn end(bench: &mut Bench<'_, '_>, mut reached: bool, plan: &Plan, watch: &Watch) -> Result<(), Cancelled> {
     let limit = plan.setup.limits.min_stretch;
+    let mut refusals = Refusals::default();
     for _ in 0..MOST_ENDINGS {
         let before = bench.editor.mesh().face_count();
         reached = reached || queue::exhaust(bench, plan.target, watch)?;
-        mend::polish(bench, POLISH_ROUNDS, watch)?;
+        mend::polish(bench, POLISH_ROUNDS, &mut refusals, watch)?;
         if reached || bench.editor.mesh().face_count() == before {
             break;
         }

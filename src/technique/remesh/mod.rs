@@ -18,7 +18,8 @@ mod search;
 
 use descent::Descent;
 pub use ops::Gain;
-use passes::{Refusals, flip_edges, relax, relax_vertices, split_long_edges};
+pub use passes::{Refusals, flip_edges, relax_vertices, towards_centroid};
+use passes::{relax, split_long_edges};
 use raise::settle_in;
 pub use raise::{faces_below, raise_stretch, touch_up};
 use regular::flip_to_regular;

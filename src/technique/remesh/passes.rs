@@ -7,14 +7,14 @@ use glam::DVec3;
 
 use super::Gain;
 use crate::mesh::geometry::area_vector;
-use crate::mesh::halfedge::{halfedge_of, twin};
+use crate::mesh::halfedge::{HalfedgeMesh, halfedge_of, twin};
 use crate::mesh::{EdgeId, Freedom, VertexId};
 use crate::technique::collapse::Editor;
 use crate::watch::{Cancelled, Watch};
 
 /// What was refused, each with one gain in mind.
 #[derive(Debug, Default)]
-pub(super) struct Refusals {
+pub struct Refusals {
     flips: Ages,
     moves: Ages,
 }
@@ -62,7 +62,7 @@ pub(super) fn split_long_edges(editor: &mut Editor<'_>, watch: &Watch) -> Result
 }
 
 /// Flips every edge that gains, past those refused before. Returns how many.
-pub(super) fn flip_edges(editor: &mut Editor<'_>, refusals: &mut Refusals, watch: &Watch) -> Result<usize, Cancelled> {
+pub fn flip_edges(editor: &mut Editor<'_>, refusals: &mut Refusals, watch: &Watch) -> Result<usize, Cancelled> {
     let mut flips = 0;
     for e in (0..editor.mesh().edge_slots()).map(EdgeId::new) {
         if e.index().is_multiple_of(256) {
@@ -89,7 +89,7 @@ fn edge_age(editor: &Editor<'_>, e: EdgeId) -> u32 {
 }
 
 /// Moves every vertex that gains, past those refused before. Returns how many.
-pub(super) fn relax_vertices(
+pub fn relax_vertices(
     editor: &mut Editor<'_>,
     refusals: &mut Refusals,
     watch: &Watch,
@@ -121,9 +121,9 @@ pub(super) fn relax(editor: &mut Editor<'_>, v: VertexId, gain: Gain) -> bool {
     }
 }
 
-/// Towards the area-weighted centroid of the star, back onto the reference.
-fn relax_tangentially(editor: &mut Editor<'_>, v: VertexId, gain: Gain) -> bool {
-    let mesh = editor.mesh();
+/// The way of a vertex to the area-weighted centroid of its star within the star's tangent plane, and the unit normal of
+/// that; `None` where the star has no area.
+pub fn towards_centroid(mesh: &HalfedgeMesh, v: VertexId) -> Option<(DVec3, DVec3)> {
     let at = mesh.point(v);
     let (mut centre, mut normal, mut weight) = (DVec3::ZERO, DVec3::ZERO, 0.0);
     for f in mesh.faces_around(v) {
@@ -134,12 +134,15 @@ fn relax_tangentially(editor: &mut Editor<'_>, v: VertexId, gain: Gain) -> bool 
         normal += vector;
         weight += area;
     }
-    let Some(normal) = normal.try_normalize() else { return false };
-    if weight <= 0.0 {
-        return false;
-    }
+    let normal = normal.try_normalize().filter(|_| weight > 0.0)?;
     let step = centre / weight;
-    let tangential = step - normal * normal.dot(step);
+    Some((step - normal * normal.dot(step), normal))
+}
+
+/// Towards the area-weighted centroid of the star, back onto the reference.
+fn relax_tangentially(editor: &mut Editor<'_>, v: VertexId, gain: Gain) -> bool {
+    let at = editor.mesh().point(v);
+    let Some((tangential, _)) = towards_centroid(editor.mesh(), v) else { return false };
     for share in [1.0, 0.4] {
         let wish = at + share * tangential;
         let to = editor.keeper.project(wish).unwrap_or(wish);
