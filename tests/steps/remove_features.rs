@@ -27,8 +27,9 @@ const COVER: [Drilled; 3] = [(2.0, [6, 0, 0]), (3.2, [13, 0, 1]), (7.0, [15, 0, 
 /// Microphone and screw bosses; the slots of the ear piece stay.
 const PANEL: [Drilled; 1] = [(5.0, [1, 6, 5])];
 
-/// Cap screws of bearings, neck and lid; twelve counterbored flange holes and the drain.
-const CASTING: [Drilled; 2] = [(12.0, [0, 40, 0]), (30.0, [13, 40, 0])];
+/// Cap screws of bearings, neck and lid; twelve counterbored flange holes and the drain. The counterbores have left
+/// notches in the four end ribs, three of them a little more than a third of the turn.
+const CASTING: [Drilled; 2] = [(12.0, [0, 40, 0]), (30.0, [13, 40, 3])];
 
 #[test]
 fn the_holes_that_a_part_was_drilled_with_go_and_nothing_else() {
