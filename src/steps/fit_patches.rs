@@ -2,8 +2,9 @@
 //!
 //! # Algorithm
 //! Curves over the common paths of elements come first, by least squares with both ends fixed; then the patches inside,
-//! by least squares over the covered vertices, each by the area around it, with a thin-plate term and corrected
-//! parameters that start from mean value coordinates. Patches beyond the tolerance get twice the spans where that helps.
+//! by least squares over the covered vertices, and places on the faces where there are none, each by the area around it,
+//! with a thin-plate term and corrected parameters that start from mean value coordinates. Patches beyond the tolerance get
+//! two or four times the spans where that helps.
 //! With `g1` both patches of a smooth seam are drawn into common tangent planes, as far as the tolerance allows. The work
 //! is done by `technique::patches`.
 //!
@@ -183,7 +184,7 @@ pub struct Step;
 
 impl StepContract for Step {
     const NAME: &'static str = "fit-patches";
-    const REVISION: u32 = 5;
+    const REVISION: u32 = 6;
     const INPUTS: &'static [InputDef] = &[
         InputDef { name: "from", accepts: &[Port::Quads], required: true, doc: "coarse quads with what they cover" },
         InputDef {

@@ -1,6 +1,6 @@
 //! Lays the vertices that an element covers flat in the unit square: the rim by length, the inside by the barycentric
 //! map with mean value weights, which keeps angles about as they are whatever the triangles are like. That is where the
-//! search for their true parameters begins.
+//! search for their true parameters begins. Where there is no vertex for a stretch, places on the faces stand in.
 //!
 //! Based on: M. S. Floater. Mean Value Coordinates. CAGD 20, 2003.
 
@@ -34,8 +34,54 @@ pub(super) fn flatten(frame: &Frame<'_>, element: usize) -> Samples {
     relax(&rows, &mut at, on_rim);
     let area = |f: FaceId| triangle_area(ground.surface.corners(f));
     let around = |&v: &VertexId| ground.faces_at.of(v).iter().map(|&f| area(f)).sum::<f64>() / 3.0;
+    let flat = |f: FaceId| ground.surface.faces[f].map(|v| at[place[&v]]);
+    let faces: Vec<(FaceId, [[f64; 2]; 3])> =
+        frame.layout.faces(element as u32).iter().map(|&f| (f, flat(f))).collect();
     let points = inside.iter().map(|&v| ground.point(v)).collect();
-    Samples { points, places: at.split_off(on_rim), weights: inside.iter().map(around).collect() }
+    let weights = inside.iter().map(around).collect();
+    let mut samples = Samples { points, places: at.split_off(on_rim), weights };
+    fill_gaps(ground, &faces, &mut samples);
+    samples
+}
+
+/// Where a square of a grid holds no vertex, the point of the mesh in its middle is a sample: a slender element may have
+/// hardly a vertex inside, and its faces still tell where its patch must lie.
+fn fill_gaps(ground: &Ground<'_>, faces: &[(FaceId, [[f64; 2]; 3])], samples: &mut Samples) {
+    /// Squares along each side.
+    const SQUARES: usize = 8;
+    /// Of the area of a square: chords of a curved surface lie a little inside of it, vertices do not.
+    const TRUST: f64 = 0.1;
+    let square = |x: f64| ((x * SQUARES as f64) as usize).min(SQUARES - 1);
+    let middle = |k: usize| (k as f64 + 0.5) / SQUARES as f64;
+    let mut holds = [false; SQUARES * SQUARES];
+    for &[u, v] in &samples.places {
+        holds[square(v) * SQUARES + square(u)] = true;
+    }
+    let total: f64 = faces.iter().map(|&(f, _)| triangle_area(ground.surface.corners(f))).sum();
+    for &(f, flat) in faces {
+        let [low, high] = [f64::min, f64::max].map(|pick| [0, 1].map(|c| flat.iter().map(|p| p[c]).reduce(pick)));
+        let range = |c: usize| square(low[c].unwrap_or(0.0))..=square(high[c].unwrap_or(1.0));
+        for (j, i) in range(1).flat_map(|j| range(0).map(move |i| (j, i))) {
+            let place = [middle(i), middle(j)];
+            if holds[j * SQUARES + i] {
+                continue;
+            }
+            let Some(shares) = barycentric(flat, place) else { continue };
+            holds[j * SQUARES + i] = true;
+            samples.points.push(ground.surface.corners(f).iter().zip(shares).map(|(&p, share)| p * share).sum());
+            samples.places.push(place);
+            samples.weights.push(TRUST * total / (SQUARES * SQUARES) as f64);
+        }
+    }
+}
+
+/// The shares of the corners at a place inside a triangle of the plane; `None` outside.
+fn barycentric(corners: [[f64; 2]; 3], place: [f64; 2]) -> Option<[f64; 3]> {
+    let cross =
+        |a: [f64; 2], b: [f64; 2]| (a[0] - place[0]) * (b[1] - place[1]) - (a[1] - place[1]) * (b[0] - place[0]);
+    let parts = [1, 2, 0].map(|k| cross(corners[k], corners[(k + 1) % 3]));
+    let sum: f64 = parts.iter().sum();
+    (sum != 0.0 && parts.iter().all(|part| part * sum >= 0.0)).then(|| parts.map(|part| part / sum))
 }
 
 /// The neighbours of a vertex with their mean value weights, which sum to one.
@@ -114,4 +160,47 @@ fn rim(frame: &Frame<'_>, element: usize) -> Vec<(VertexId, [f64; 2])> {
         }
     }
     all
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+
+    use super::*;
+    use crate::mesh::Surface;
+
+    #[test]
+    fn shares_of_a_place_give_it_back_whichever_way_the_triangle_turns() {
+        let corners = [[0.1, 0.2], [0.9, 0.3], [0.4, 0.8]];
+        let turned = [corners[1], corners[0], corners[2]];
+        for triangle in [corners, turned] {
+            let shares = barycentric(triangle, [0.45, 0.4]).expect("a place inside");
+            for c in 0..2 {
+                let back: f64 = triangle.iter().zip(shares).map(|(corner, share)| corner[c] * share).sum();
+                assert!((back - [0.45, 0.4][c]).abs() < 1e-15, "{back}");
+            }
+        }
+        assert_eq!(barycentric(corners, [0.1, 0.8]), None);
+        assert_eq!(barycentric([[0.1, 0.1], [0.2, 0.2], [0.3, 0.3]], [0.2, 0.2]), None, "a triangle without area");
+    }
+
+    #[test]
+    fn an_element_without_an_inner_vertex_still_has_samples_on_its_faces() {
+        let points = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
+        let surface = Surface {
+            points: points.iter().map(|&[x, y]| DVec3::new(x, y, 0.5 * x)).collect(),
+            faces: [[0, 1, 2], [0, 2, 3]].iter().map(|f| f.map(VertexId::new)).collect(),
+            ..Surface::default()
+        };
+        let ground = Ground::new(&surface);
+        let faces: Vec<_> = surface.faces.enumerate().map(|(f, v)| (f, v.map(|v| points[v.index()]))).collect();
+        let mut samples = Samples::default();
+        fill_gaps(&ground, &faces, &mut samples);
+        assert_eq!(samples.points.len(), 64);
+        for (p, [u, v]) in samples.points.iter().zip(&samples.places) {
+            assert!(p.distance(DVec3::new(*u, *v, 0.5 * u)) < 1e-15, "{p}");
+        }
+        let area = 1.25_f64.sqrt();
+        assert!((samples.weights.iter().sum::<f64>() - 0.1 * area).abs() < 1e-12);
+    }
 }

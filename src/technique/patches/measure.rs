@@ -53,15 +53,6 @@ fn distance(tree: &TriangleBvh, p: DVec3) -> f64 {
     tree.closest(p).map_or(0.0, |near| near.distance())
 }
 
-/// For each element the largest angle between planes along its smooth seams; degrees.
-pub(super) fn angles(frame: &Frame<'_>, fits: &[Fit]) -> Vec<f64> {
-    let mut angles = vec![0.0_f64; fits.len()];
-    for seam in seams(frame, fits).into_iter().filter(|seam| seam.is_smooth) {
-        seam.patches.iter().for_each(|&e| angles[e as usize] = angles[e as usize].max(seam.angle));
-    }
-    angles
-}
-
 /// The angle between the tangent planes along each inner arc.
 pub(super) fn seams(frame: &Frame<'_>, fits: &[Fit]) -> Vec<Seam> {
     /// Places along a seam where the planes are compared; the ends are common to more than two patches.

@@ -1,10 +1,11 @@
 //! Fits bicubic B-spline patches to the faces that the elements of a quad mesh cover.
 //!
 //! The common curves come first, least squares over the path with both ends fixed, so that neighbours share them; then
-//! the control points inside, least squares over the covered vertices with a thin-plate term, whose parameters are then
-//! corrected to the feet of the vertices and the fit repeated. A patch farther from the mesh than the tolerance, or the mesh
-//! from it, gets twice the spans, where that helps. Patches meet in common curves, which follow the paths without their zigzag; the
-//! angle between their tangent planes is measured. On demand smooth seams get a common plane at each of their points:
+//! the control points inside, least squares over the covered vertices, and over places between them where there are none,
+//! with a thin-plate term; the parameters are then corrected to the feet of these samples and the fit repeated. A patch
+//! farther from the mesh than the tolerance, or the mesh from it, gets two or four times the spans, where that helps.
+//! Patches meet in common curves, which follow the paths without their zigzag; the angle between their tangent planes is
+//! measured. On demand smooth seams get a common plane at each of their points:
 //! curves leave their nodes in one plane, and the control points next to a seam are drawn into the mean of the planes of
 //! both patches, by the same least squares, as far as the tolerance allows and no patch folds. That is tangent continuity
 //! within a tolerance, not to the last digit, which bicubic patches round any node cannot have.
@@ -31,8 +32,8 @@ use crate::watch::{Cancelled, Watch};
 use fit::Fit;
 pub use frame::FrameError;
 use frame::{Frame, covered, frame};
-use measure::{Distances, angles, seams};
-use refine::{Fault, Spans};
+use measure::{Distances, seams};
+use refine::Spans;
 use solve::{Curve, fit_curve, fit_curve_with};
 use tangent::{end_planes, is_inside};
 
@@ -87,14 +88,12 @@ pub fn fit_patches(surface: &Surface, quads: &Quads, rules: &FitRules, watch: &W
         }
         watch.check()?;
         let errors = distances.of(&frame, &fits);
-        let angles = angles(&frame, &fits);
         for (fit, error) in fits.iter_mut().zip(&errors) {
             (fit.patch.max_error, fit.patch.rms_error) = *error;
         }
-        let faults: Vec<Fault> =
-            errors.iter().zip(angles).map(|(error, angle)| Fault { error: error.0, angle }).collect();
+        let largest: Vec<f64> = errors.iter().map(|error| error.0).collect();
         let room: Vec<usize> = fits.iter().map(|fit| fit.samples.points.len()).collect();
-        if !spans.refine(&faults, &room, rules) {
+        if !spans.refine(&largest, &room, rules) {
             break;
         }
     }
