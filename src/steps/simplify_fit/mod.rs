@@ -7,7 +7,8 @@
 //! it. The new vertex lies where the aspect ratios round it are best. Before the first edit the spheres and cylinders
 //! that the part consists of are recognised whole (`technique::fit::regions`); where all that a merge joins lies on one
 //! of them, the new vertex goes onto it without a trial, in any case. Then the faces above `max-aspect` are mended, and
-//! the rounds go on until the target holds.
+//! the rounds go on until the target holds. At the end flips and small moves make shapes better: vertices on a fit move
+//! along it, such in flat areas within their plane, all others along the reference.
 //!
 //! Based on: Zhang, Wang, Zhou, Li, a paper of 2009 on simplification of finite triangular surface meshes by feature
 //! recognition.
