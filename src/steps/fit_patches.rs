@@ -4,7 +4,7 @@
 //! Curves over the common paths of elements come first, by least squares with both ends fixed; then the patches inside,
 //! by least squares over the covered vertices, and places on the faces where there are none, each by the area around it,
 //! with a thin-plate term and corrected parameters that start from mean value coordinates. Patches beyond the tolerance get
-//! two or four times the spans where that helps.
+//! twice the spans and more, where that helps.
 //! With `g1` both patches of a smooth seam are drawn into common tangent planes, as far as the tolerance allows. The work
 //! is done by `technique::patches`.
 //!

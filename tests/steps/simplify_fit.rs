@@ -243,3 +243,28 @@ fn what_cannot_be_reached_is_told() {
     let wild = run_locked("simplify-fit", "main", "k-m = 9", "", &[("from", mesh)]);
     assert!(wild.unwrap_err().message.contains("k-m"));
 }
+
+/// A bar ten thousand times as long as thick: vertices in its needles would make hundreds of needles out of a few.
+#[test]
+fn needles_that_cannot_be_mended_stay_as_few_as_they_are() {
+    let mut mesh = shapes::surface(&shapes::cylinder(8, 2));
+    for p in mesh.points.iter_mut() {
+        p.z *= 1e4;
+    }
+    let needles = |mesh: &Surface| {
+        let aspect = |f| meshmill::mesh::geometry::aspect_ratio(mesh.corners(f));
+        mesh.faces.ids().filter(|&f| aspect(f) > 20.0).count()
+    };
+    let before = (mesh.faces.len(), needles(&mesh));
+    let made = run("simplify-fit", "remove = 0, tolerance = \"0.01%\"", &surface(mesh));
+    let result = made.artifact.as_surface().unwrap();
+    assert!(before.1 > 0);
+    assert!(
+        needles(result) <= before.1 && result.faces.len() <= before.0,
+        "{} of {}",
+        needles(result),
+        result.faces.len()
+    );
+    let measured = metric::measure(&made.artifact.to_soup().unwrap(), None, &Watch::silent()).unwrap();
+    assert_eq!(measured.get("self-intersections").unwrap().as_f64(), 0.0);
+}

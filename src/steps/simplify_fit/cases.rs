@@ -50,6 +50,8 @@ pub(super) struct Bench<'e, 'a> {
     pub(super) surfaces: &'e mut Surfaces,
     pub(super) dispersion: Vec<f32>,
     pub(super) done: Done,
+    /// Whether needles may get new vertices.
+    pub(super) may_insert: bool,
     /// Positions that get the costly tests.
     pub(super) most_tried: usize,
     /// Whether the tolerance bounds `Err` of a projection only.

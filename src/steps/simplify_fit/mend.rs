@@ -124,7 +124,7 @@ fn mend_face(bench: &mut Bench<'_, '_>, f: FaceId, limit: f64, rules: &CollapseR
         if sides.iter().rev().any(|&e| bench.editor.try_flip(e, Gain::Mend(limit))) {
             continue;
         }
-        if is_wedge(bench, f, limit) || !insert(bench, f) {
+        if !bench.may_insert || is_wedge(bench, f, limit) || !insert(bench, f) {
             return;
         }
     }

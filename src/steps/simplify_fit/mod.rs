@@ -17,7 +17,8 @@
 //! - Topology, marked curves and kept elements stay; no new self-intersection; no face turns over.
 //! - In `distance` mode the surface stays within the tolerance of the reference, both ways, at every moment.
 //! - A vertex with `fit-kind` above 0 lies on its fit, within 1e-9 of the radius. Flat faces stay exactly flat.
-//! - No edit makes a face worse than both `max-aspect` and the worst face that it replaces.
+//! - No edit makes a face worse than both `max-aspect` and the worst face that it replaces. Where new vertices in needles
+//!   leave more faces above `max-aspect` than there were, or more faces than without any, none are made.
 //!
 //! # Cost
 //! O(F log F).
@@ -47,7 +48,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::mesh::halfedge::EnterError;
 use crate::mesh::transfer::inherit_fields;
-use crate::mesh::{Field, FreedomError, LockRules, Support, Surface, VertexId, resolve_freedom};
+use crate::mesh::{FreedomError, LockRules, Surface, VertexId, resolve_freedom};
 use crate::step::{
     Angle, Artifact, InputDef, Inputs, Length, Locks, OutPort, OutputDef, Port, Produced, Share, StepFailure,
 };
@@ -240,7 +241,26 @@ pub fn simplify_fit(
     params: &SimplifyFitParams,
     watch: &Watch,
 ) -> Result<(Surface, SimplifyFitStats), SimplifyFitError> {
-    let plan = Plan::new(&input, params)?;
+    let mut plan = Plan::new(&input, params)?;
+    let made = simplified(&input, params, &plan, watch)?;
+    let needles = made.1.faces_above_aspect;
+    let makes_needles = needles > report::needles(input.surface, params.max_aspect);
+    if !makes_needles && made.0.faces.len() <= input.surface.faces.len() {
+        return Ok(made);
+    }
+    // Bars and sheets thousands of times as long as thick: new vertices are many, or make more needles than there were.
+    plan.may_insert = false;
+    let other = simplified(&input, params, &plan, watch)?;
+    Ok(if makes_needles || other.1.faces_above_aspect <= needles { other } else { made })
+}
+
+/// One run from the surface to the result with its statistics.
+fn simplified(
+    input: &SimplifyFitInput<'_>,
+    params: &SimplifyFitParams,
+    plan: &Plan,
+    watch: &Watch,
+) -> Result<(Surface, SimplifyFitStats), SimplifyFitError> {
     let (surface, smooth_edges) = marked(input.surface, params, plan.tolerance);
     // Only where the reference tells its own curves it must tell the smooth ones too.
     let shares = std::ptr::eq(input.surface, input.reference);
@@ -251,20 +271,20 @@ pub fn simplify_fit(
     let tree = reference_tree(plan.setup.mode, reference);
     let mut editor = open(&surface, &freedom, reference, &tree, plan.setup.clone())?;
     let mut fits = Surfaces::new(editor.mesh().vertex_slots(), plan.tolerance);
-    let done = run(&mut editor, &mut fits, params, &plan, watch)?;
+    let done = run(&mut editor, &mut fits, params, plan, watch)?;
     let counts = editor.counts();
     let is_short = editor.mesh().face_count() > plan.target;
     let barred = is_short.then(|| report::bars(&mut editor, plan.setup.limits.min_stretch));
     let distance_bound = editor.distance_bound(plan.tolerance);
     let slots: Vec<VertexId> = editor.mesh().vertices().collect();
-    let on_fits: Vec<_> = slots.iter().map(|&v| on_fit(&fits, editor.mesh().point(v), v)).collect();
+    let on_fits: Vec<_> = slots.iter().map(|&v| report::on_fit(&fits, editor.mesh().point(v), v)).collect();
     let mut result = editor.into_mesh().leave().surface;
     let freedom = resolve_freedom(&result, &input.locks)?;
     let least = least_stretch_of(params.max_aspect);
     let mut stats = report::quality(&result, &freedom, params.max_aspect, least);
     tangent::without_smooth_lines(&mut result);
     inherit_fields(input.surface, &mut result);
-    set_fields(&mut result, &on_fits);
+    report::set_fields(&mut result, &on_fits);
     stats.faces_before = input.surface.faces.len();
     stats.target_faces = plan.target;
     stats.removed = 1.0 - result.faces.len() as f64 / input.surface.faces.len().max(1) as f64;
@@ -302,6 +322,7 @@ fn run(
         params,
         surfaces: fits,
         done: Done::default(),
+        may_insert: plan.may_insert,
         most_tried: cases::MOST_TRIED,
         plane_tolerance: is_plane.then_some(plan.tolerance),
     };
@@ -356,6 +377,8 @@ struct Plan {
     target: usize,
     tolerance: f64,
     setup: Setup,
+    /// Whether needles may get new vertices.
+    may_insert: bool,
 }
 
 impl Plan {
@@ -397,7 +420,7 @@ impl Plan {
             limits,
             may_merge_corners: input.locks.keep.is_empty() && input.locks.only.is_empty(),
         };
-        Ok(Self { target, tolerance, setup })
+        Ok(Self { target, tolerance, setup, may_insert: true })
     }
 }
 
@@ -422,21 +445,6 @@ fn marked(surface: &Surface, params: &SimplifyFitParams, tolerance: f64) -> (Sur
     if params.keep_flat { tangent::with_smooth_lines(surface, tolerance) } else { (surface.clone(), 0) }
 }
 
-/// The fit that a vertex lies on, tested on where it lies.
-fn on_fit(fits: &Surfaces, p: glam::DVec3, v: VertexId) -> Option<(FitKind, f64)> {
-    let number = fits.number(v)?;
-    let fit = fits.of(v).filter(|_| fits.holds(number, p))?;
-    Some((FitKind::of(fit), fit.radius()))
-}
-
-fn set_fields(result: &mut Surface, on_fits: &[Option<(FitKind, f64)>]) {
-    let kinds = on_fits.iter().map(|fit| fit.map_or(0.0, |(kind, _)| kind.number())).collect();
-    let radii = on_fits.iter().map(|fit| fit.map_or(0.0, |(_, radius)| radius)).collect();
-    for (name, values) in [("fit-kind", kinds), ("fit-radius", radii)] {
-        result.carried.set_field(Field { name: name.into(), support: Support::Vertex, components: 1, values });
-    }
-}
-
 impl From<SimplifyFitError> for StepFailure {
     fn from(error: SimplifyFitError) -> Self {
         let message = error.to_string();
@@ -454,7 +462,7 @@ pub struct Step;
 
 impl crate::step::Step for Step {
     const NAME: &'static str = "simplify-fit";
-    const REVISION: u32 = 7;
+    const REVISION: u32 = 8;
     const INPUTS: &'static [InputDef] = &[
         InputDef { name: "from", accepts: &[Port::Surface], required: true, doc: "the surface to simplify" },
         InputDef {

@@ -2,12 +2,14 @@
 
 use std::collections::BTreeMap;
 
+use glam::DVec3;
 use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::cases::{Done, MOST_VALENCE};
+use super::surfaces::Surfaces;
 use crate::mesh::geometry::{aspect_ratio, centroid, stretch};
-use crate::mesh::{EdgeId, ResolvedFreedom, Surface};
+use crate::mesh::{EdgeId, Field, ResolvedFreedom, Support, Surface, VertexId};
 use crate::technique::collapse::session::{Cause, cause};
 use crate::technique::collapse::{Bars, CollapseRules, Counts, Editor, Order, Priority};
 use crate::technique::fit::{FitRegion, Quadric};
@@ -274,6 +276,31 @@ pub(super) fn bars(editor: &mut Editor<'_>, min_stretch: f64) -> Bars {
     bars
 }
 
+/// The fit that a vertex lies on, tested on where it lies.
+pub(super) fn on_fit(fits: &Surfaces, p: DVec3, v: VertexId) -> Option<(FitKind, f64)> {
+    let number = fits.number(v)?;
+    let fit = fits.of(v).filter(|_| fits.holds(number, p))?;
+    Some((FitKind::of(fit), fit.radius()))
+}
+
+/// Carries the fits on the result: `fit-kind` and `fit-radius`.
+pub(super) fn set_fields(result: &mut Surface, on_fits: &[Option<(FitKind, f64)>]) {
+    let kinds = on_fits.iter().map(|fit| fit.map_or(0.0, |(kind, _)| kind.number())).collect();
+    let radii = on_fits.iter().map(|fit| fit.map_or(0.0, |(_, radius)| radius)).collect();
+    for (name, values) in [("fit-kind", kinds), ("fit-radius", radii)] {
+        result.carried.set_field(Field { name: name.into(), support: Support::Vertex, components: 1, values });
+    }
+}
+
+/// Faces above an aspect ratio.
+pub(super) fn needles(surface: &Surface, max_aspect: f64) -> usize {
+    surface.faces.ids().filter(|&f| is_above(aspect_ratio(surface.corners(f)), max_aspect)).count()
+}
+
+fn is_above(aspect: f64, most: f64) -> bool {
+    aspect.is_nan() || aspect > most
+}
+
 /// The figures that are counted on the result alone.
 pub(super) fn quality(
     result: &Surface,
@@ -289,7 +316,7 @@ pub(super) fn quality(
         least = least.min(shape);
         sum += shape;
         below_20 += usize::from(aspect < 20.0);
-        if aspect.is_nan() || aspect > max_aspect {
+        if is_above(aspect, max_aspect) {
             let aspect = aspect.is_finite().then_some(aspect);
             let cause = cause(result, freedom, f, least_allowed);
             poor.push(PoorFace { face: f.raw(), at: centroid(corners).to_array(), aspect, cause });

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::fit::Fit;
 use super::frame::Frame;
 use super::sample::{tessellate, triangles};
-use super::{at_seam, normal};
+use super::{at_seam, normal, on_side};
 use crate::mesh::bvh::TriangleBvh;
 use crate::mesh::patches::{Patch, Seam};
 use crate::mesh::{Facet, Soup, Surface};
@@ -39,8 +39,16 @@ impl Distances {
                 let own = fit.patch.point(u, v).distance(p);
                 tree.closest_within(p, own * own).map_or(own, |near| near.distance().min(own))
             });
-            let rim = frame.sides[e].iter().flat_map(|&(arc, _)| &frame.arcs[arc].path);
-            let rim = rim.map(|&v| distance(&tree, ground.point(v)));
+            let rim = frame.sides[e].iter().enumerate().flat_map(|(side, &(arc, is_along))| {
+                let path = &frame.arcs[arc].path;
+                let share = move |k: usize| k as f64 / (path.len() - 1) as f64;
+                path.iter().enumerate().map(move |(k, &v)| (side, if is_along { share(k) } else { 1.0 - share(k) }, v))
+            });
+            let rim = rim.map(|(side, t, v)| {
+                let p = ground.point(v);
+                let [u, v] = fit.patch.foot(p, on_side(side, frame.sides[e].len(), t));
+                distance(&tree, p).min(fit.patch.point(u, v).distance(p))
+            });
             let back = facets[e * FINE * FINE..(e + 1) * FINE * FINE].iter().flat_map(|f| f.corners());
             let all: Vec<f64> = own.chain(rim).chain(back.map(|&v| out[v.index()])).collect();
             (all.iter().copied().fold(0.0, f64::max), rms(&all).unwrap_or(0.0))

@@ -3,7 +3,7 @@
 //! The common curves come first, least squares over the path with both ends fixed, so that neighbours share them; then
 //! the control points inside, least squares over the covered vertices, and over places between them where there are none,
 //! with a thin-plate term; the parameters are then corrected to the feet of these samples and the fit repeated. A patch
-//! farther from the mesh than the tolerance, or the mesh from it, gets two or four times the spans, where that helps.
+//! farther from the mesh than the tolerance, or the mesh from it, gets more spans, where that helps.
 //! Patches meet in common curves, which follow the paths without their zigzag; the angle between their tangent planes is
 //! measured. On demand smooth seams get a common plane at each of their points:
 //! curves leave their nodes in one plane, and the control points next to a seam are drawn into the mean of the planes of

@@ -22,11 +22,11 @@ impl Spans {
         &self.counts
     }
 
-    /// Takes back what did not help and doubles the spans of what is not good enough; whether anything changed.
+    /// Doubles the spans of what is not good enough, and takes back what did not help; whether anything changed.
     ///
-    /// A bend needs more than twice the spans before they help, so two doublings are tried together. What was taken back
-    /// is not tried again, so that this ends: vertices of a coarse mesh have folds between them that a patch of more
-    /// spans follows, and curves that its neighbours must follow then.
+    /// A bend or a ripple needs several times the spans before they help at all, so doublings go on while there is room.
+    /// What was taken back is not tried again, so that this ends: vertices of a coarse mesh have folds between them that a
+    /// patch of more spans follows, and curves that its neighbours must follow then.
     pub(super) fn refine(&mut self, errors: &[f64], samples: &[usize], rules: &FitRules) -> bool {
         let mut changed = false;
         for (e, &now) in errors.iter().enumerate() {
@@ -34,8 +34,7 @@ impl Spans {
                 continue;
             }
             let before = self.tried[e].filter(|&(_, before)| !helps(before, now, rules));
-            let may_go_on = before.is_none_or(|(spans, _)| self.counts[e] == 2 * spans);
-            if may_go_on && self.has_room(e, samples[e], rules) && now > rules.tolerance {
+            if self.has_room(e, samples[e], rules) && now > rules.tolerance {
                 self.tried[e] = Some(before.unwrap_or((self.counts[e], now)));
                 self.counts[e] *= 2;
                 changed = true;
@@ -69,17 +68,17 @@ mod tests {
     const RULES: FitRules = FitRules { tolerance: 1.0, max_spans: 8, fairness: 1e-6, density: 4, smooth: Some(2.0) };
 
     #[test]
-    fn what_two_doublings_do_not_help_is_taken_back_and_not_tried_again() {
+    fn what_no_doubling_helps_is_taken_back_and_not_tried_again() {
         let mut spans = Spans::new(2);
         let mut counts = Vec::new();
         while spans.refine(&[3.0, 0.5], &[1_000, 1_000], &RULES) {
             counts.push(spans.counts().to_vec());
         }
-        assert_eq!(counts, [[2, 1], [4, 1], [1, 1]]);
+        assert_eq!(counts, [[2, 1], [4, 1], [8, 1], [1, 1]]);
     }
 
     #[test]
-    fn what_the_second_doubling_helps_stays() {
+    fn what_a_later_doubling_helps_stays() {
         let mut spans = Spans::new(1);
         for error in [3.0, 2.9, 0.9] {
             spans.refine(&[error], &[1_000], &RULES);
