@@ -248,7 +248,7 @@ fn what_cannot_be_reached_is_told() {
 #[test]
 fn needles_that_cannot_be_mended_stay_as_few_as_they_are() {
     let mut mesh = shapes::surface(&shapes::cylinder(8, 2));
-    for p in mesh.points.iter_mut() {
+    for p in &mut mesh.points {
         p.z *= 1e4;
     }
     let needles = |mesh: &Surface| {
