@@ -50,10 +50,20 @@ def enter_environment():
         return
     python = home / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
     if not python.exists():
-        venv.create(home, with_pip=True)
+        try:
+            venv.create(home, with_pip=True)
+        except (OSError, subprocess.CalledProcessError) as error:
+            print("SKIPPED: no virtual environment can be made here (apt-get install python3-venv):", error)
+            sys.exit(0 if "--small" in sys.argv else 1)
     pip = [str(python), "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
     if subprocess.run([*pip, "-r", str(HERE / "requirements.txt")]).returncode != 0:
         print("SKIPPED: the peers cannot be installed here (no network, or no wheels for this platform)")
+        sys.exit(0 if "--small" in sys.argv else 1)
+    # Open3D is linked to libraries that a bare server has not.
+    loaded = subprocess.run([python, "-c", "import open3d, pymeshlab, fast_simplification"], capture_output=True, text=True)
+    if loaded.returncode != 0:
+        print("SKIPPED: a peer does not load (apt-get install libusb-1.0-0 libgl1 libgomp1):",
+              loaded.stderr.strip().splitlines()[-1])
         sys.exit(0 if "--small" in sys.argv else 1)
     os.execv(python, [str(python), *sys.argv])
 
