@@ -137,7 +137,7 @@ pub struct Step;
 
 impl StepContract for Step {
     const NAME: &'static str = "adapt-density";
-    const REVISION: u32 = 3;
+    const REVISION: u32 = 4;
     const INPUTS: &'static [InputDef] = &[
         InputDef {
             name: "from",

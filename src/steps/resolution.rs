@@ -102,7 +102,7 @@ pub struct Step;
 
 impl StepContract for Step {
     const NAME: &'static str = "resolution";
-    const REVISION: u32 = 3;
+    const REVISION: u32 = 4;
     const INPUTS: &'static [InputDef] = &[InputDef {
         name: "from",
         accepts: &[Port::Hierarchy],

@@ -280,7 +280,7 @@ pub struct Step;
 
 impl crate::step::Step for Step {
     const NAME: &'static str = "control-properties";
-    const REVISION: u32 = 14;
+    const REVISION: u32 = 15;
     const INPUTS: &'static [InputDef] = &[
         InputDef { name: "from", accepts: &[Port::Surface], required: true, doc: "the surface to simplify" },
         InputDef {

@@ -5,9 +5,7 @@
 
 use std::f64::consts::FRAC_PI_2;
 
-use glam::DVec3;
-
-use super::check::{Check, Fault, mean_side, smaller};
+use super::check::{Check, Fault, Wish, mean_side, smaller};
 use super::reuse::{Attempt, signs, take_over};
 use super::settle::settle;
 use super::{QMorphError, QMorphParams, QMorphStats, sizes};
@@ -95,25 +93,22 @@ impl Morpher<'_, '_> {
         remesh(&mut mesh, ground, rules, watch)?;
         prepare(&mut mesh, ground, self.check, rules, watch)?;
         let mut best = self.attempt(mesh, None, rules, stats)?.ok_or(QMorphError::Empty)?;
-        let mut failures = vec![0_u8; stats.regions];
+        let mut asked = Asked::new(stats.regions);
         let mut attempts = 1;
-        let mut tried = Vec::new();
         while attempts < most {
-            let places = wanting(&best, &failures, rules.tolerance);
-            if places.is_empty() || places == tried {
+            let places = asked.places(&best, rules.tolerance);
+            if places.is_empty() {
                 break;
             }
             let mut mesh = best.triangles.clone();
             tighten(&mut mesh, ground, rules, &places, watch)?;
-            let Some(next) = self.attempt(mesh, Some(&best), rules, stats)? else { break };
             attempts += 1;
-            for (r, failures) in failures.iter_mut().enumerate() {
-                *failures += u8::from(next.by_region[r] > best.by_region[r]);
-            }
-            if next.lack < best.lack {
+            let next = self.attempt(mesh, Some(&best), rules, stats)?;
+            let is_better = next.as_ref().is_some_and(|next| next.is_better_than(&best));
+            asked.learn(&best.by_region, next.as_ref().map(|next| &*next.by_region), is_better);
+            if let Some(next) = next.filter(|_| is_better) {
                 best = next;
             }
-            tried = places;
         }
         best.stats.attempts = attempts;
         Ok(best)
@@ -148,10 +143,9 @@ impl Morpher<'_, '_> {
         }
         advance_and_clean(&mut quads, ground, rules, &awake, &mut stats, watch)?;
         stats.clean_edits += finish(&mut quads, ground, rules.curve_tolerance, &awake, watch)?.edits;
-        let mut faults = settle(&mut quads, ground, self.check, rules.tolerance, &awake, watch)?;
-        let left = earlier.iter().flat_map(|earlier| earlier.faults_left(&awake));
-        // An edit beside a region at rest may have taken a face of it.
-        faults.extend(left.filter(|fault| fault.face < quads.face_slots() && quads.is_face(fault.face)));
+        settle(&mut quads, ground, self.check, rules.tolerance, &awake, watch)?;
+        // In all regions: the face nearest to a place may belong to another region than the place.
+        let faults = self.check.beyond(&quads, rules.tolerance, &vec![true; stats.regions], watch)?;
         let (lack, by_region) = lack(&quads, &faults, rules.tolerance, stats.regions);
         Ok(Some(Attempt { triangles, signs, quads, faults, lack, by_region, stats }))
     }
@@ -167,7 +161,8 @@ fn prepare(mesh: &mut Mixed, ground: &Ground<'_>, check: &Check, rules: Rules, w
             break;
         }
         let before = signs(mesh, changed.len());
-        let places: Vec<_> = faults.iter().map(|fault| smaller(mesh, fault, tolerance)).collect();
+        let wish = |fault: &Fault| smaller(mesh, fault, mean_side(mesh, fault.face), tolerance);
+        let places: Vec<_> = faults.iter().map(wish).collect();
         tighten(mesh, ground, rules, &places, watch)?;
         changed = signs(mesh, changed.len()).iter().zip(before).map(|(now, before)| *now != before).collect();
     }
@@ -218,24 +213,67 @@ fn shortfall(mesh: &Mixed, f: u32) -> f64 {
     (fair - quality).max(0.0)
 }
 
-/// Where another attempt should have smaller faces: at faults of sound faces, and at poor faces, whose strips get more
-/// room for good ones. Where one failed, still smaller; not in regions where two did.
-fn wanting(attempt: &Attempt, failures: &[u8], tolerance: f64) -> Vec<(DVec3, f64, f64)> {
-    let mesh = &attempt.quads;
-    let failed = |f: u32| failures[mesh.region(f) as usize];
-    let wants = |f: u32| failed(f) < FAILURES;
-    let again = |f: u32| if failed(f) == 0 { 1.0 } else { AGAIN };
-    let mut places = Vec::new();
-    for fault in attempt.faults.iter().filter(|fault| wants(fault.face) && mesh.quality(fault.face) > USEFUL) {
-        let (at, reach, size) = smaller(mesh, fault, tolerance);
-        places.push((at, reach, again(fault.face) * size));
+/// What to ask of the next attempt, by what became of those before.
+struct Asked {
+    /// By region, the attempts that did not make it better.
+    failures: Vec<u8>,
+    /// Where the last attempt was worse as a whole, the regions that it made better: they are asked for alone.
+    only: Option<Vec<bool>>,
+    /// Whether the attempt asked for is to make each region better.
+    regions: Vec<bool>,
+}
+
+impl Asked {
+    fn new(regions: usize) -> Self {
+        Self { failures: vec![0; regions], only: None, regions: vec![false; regions] }
     }
-    for f in mesh.faces().filter(|&f| wants(f) && shortfall(mesh, f) > 0.0) {
-        // A sliver's sides say nothing about what would do in its place.
-        let side = mean_side(mesh, f).max(LEAST_ROOM * mean_size(mesh, f));
-        places.push((mesh.centre(f), 1.2 * side, again(f) * ROOM * side));
+
+    /// Where the next attempt should have smaller faces: at faults of sound faces, and at poor faces, whose strips get
+    /// more room for good ones. Where one failed, still smaller; not in regions where two did.
+    fn places(&mut self, best: &Attempt, tolerance: f64) -> Vec<Wish> {
+        let mesh = &best.quads;
+        let wants = |f: u32| {
+            let region = mesh.region(f) as usize;
+            self.failures[region] < FAILURES && self.only.as_ref().is_none_or(|only| only[region])
+        };
+        let again = |f: u32| if self.failures[mesh.region(f) as usize] == 0 { 1.0 } else { AGAIN };
+        let mut asked = vec![false; self.regions.len()];
+        let mut places = Vec::new();
+        for fault in best.faults.iter().filter(|fault| wants(fault.face) && mesh.quality(fault.face) > USEFUL) {
+            // Quads may come out larger than they were to be.
+            let side = mean_side(mesh, fault.face).min(mean_size(mesh, fault.face));
+            let (at, reach, size) = smaller(mesh, fault, side, tolerance);
+            places.push((at, reach, again(fault.face) * size));
+            asked[mesh.region(fault.face) as usize] = true;
+        }
+        for f in mesh.faces().filter(|&f| wants(f) && shortfall(mesh, f) > 0.0) {
+            // A sliver's sides say nothing about what would do in its place.
+            let side = mean_side(mesh, f).max(LEAST_ROOM * mean_size(mesh, f));
+            places.push((mesh.centre(f), 1.2 * side, again(f) * ROOM * side));
+            asked[mesh.region(f) as usize] = true;
+        }
+        self.regions = asked;
+        places
     }
-    places
+
+    /// What regions lacked before, and what they do after the attempt, if it changed anything.
+    fn learn(&mut self, before: &[f64], after: Option<&[f64]>, is_better: bool) {
+        let Some(after) = after else {
+            self.only = None;
+            for (failures, _) in self.failures.iter_mut().zip(&self.regions).filter(|(_, asked)| **asked) {
+                *failures += 1;
+            }
+            return;
+        };
+        for (r, failures) in self.failures.iter_mut().enumerate() {
+            let failed = after[r] > before[r] || self.regions[r] && after[r] == before[r];
+            *failures = failures.saturating_add(u8::from(failed));
+        }
+        let better: Vec<bool> =
+            self.regions.iter().enumerate().map(|(r, asked)| *asked && after[r] < before[r]).collect();
+        let alone = !is_better && self.only.is_none() && better.contains(&true);
+        self.only = alone.then_some(better);
+    }
 }
 
 /// The mean length of the sides that a face is to have.

@@ -72,9 +72,11 @@ impl Check {
     }
 }
 
-/// Where a fault is, how far about it, and the size that should do there.
-pub(super) fn smaller(mesh: &Mixed, fault: &Fault, tolerance: f64) -> (DVec3, f64, f64) {
-    let side = mean_side(mesh, fault.face);
+/// A place, how far about it, and the size that faces are to have there.
+pub(super) type Wish = (DVec3, f64, f64);
+
+/// Where a fault is, how far about it, and the size that should do there, if faces are to have `side` now.
+pub(super) fn smaller(mesh: &Mixed, fault: &Fault, side: f64, tolerance: f64) -> Wish {
     // Between what a round place needs, the square root, and what a pointed one does.
     let factor = libm::pow(0.75 * tolerance / fault.distance, 0.75).clamp(0.4, 0.82);
     (mesh.centre(fault.face), 1.2 * side, factor * side)

@@ -31,15 +31,10 @@ pub(super) struct Attempt {
 }
 
 impl Attempt {
-    /// The faults in regions at rest, by the faces that [`take_over`] makes of theirs.
-    pub(super) fn faults_left(&self, awake: &[bool]) -> Vec<Fault> {
-        let rests = |f: u32| !awake[self.quads.region(f) as usize];
-        let mut number = vec![NONE; self.quads.face_slots() as usize];
-        for (new, f) in self.quads.faces().filter(|&f| rests(f)).enumerate() {
-            number[f as usize] = new as u32;
-        }
-        let left = self.faults.iter().filter(|fault| rests(fault.face));
-        left.map(|fault| Fault { face: number[fault.face as usize], ..*fault }).collect()
+    /// Whether this one lacks less than another: as a whole, or else in the sum of its regions.
+    pub(super) fn is_better_than(&self, other: &Self) -> bool {
+        let sum = |attempt: &Self| attempt.by_region.iter().sum::<f64>();
+        self.lack < other.lack || self.lack == other.lack && sum(self) < sum(other)
     }
 }
 

@@ -20,7 +20,7 @@ const CALM: f64 = 0.8;
 /// Points of the surface looked at round a vertex.
 const POINTS: usize = 64;
 
-/// Moves vertices at faults in regions that are `awake` until there is none, or no move helps. Returns what is left.
+/// Moves vertices at faults in regions that are `awake` until there is none, or no move helps.
 pub(super) fn settle(
     mesh: &mut Mixed,
     ground: &Ground<'_>,
@@ -28,7 +28,7 @@ pub(super) fn settle(
     tolerance: f64,
     awake: &[bool],
     watch: &Watch,
-) -> Result<Vec<Fault>, Cancelled> {
+) -> Result<(), Cancelled> {
     let mut faults = check.beyond(mesh, tolerance, awake, watch)?;
     for _ in 0..CHECKS {
         let mut work = Settler { mesh, ground, check, tolerance };
@@ -51,7 +51,7 @@ pub(super) fn settle(
         faults.retain(|fault| !moved[mesh.region(fault.face) as usize]);
         faults.extend(check.beyond(mesh, tolerance, &moved, watch)?);
     }
-    Ok(faults)
+    Ok(())
 }
 
 struct Settler<'a, 'g> {

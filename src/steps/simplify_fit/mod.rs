@@ -250,7 +250,8 @@ pub fn simplify_fit(
     }
     // Bars and sheets thousands of times as long as thick: new vertices are many, or make more needles than there were.
     plan.may_insert = false;
-    let other = simplified(&input, params, &plan, watch)?;
+    let mut other = simplified(&input, params, &plan, watch)?;
+    other.1.without_new_vertices = true;
     Ok(if makes_needles || other.1.faces_above_aspect <= needles { other } else { made })
 }
 
@@ -462,7 +463,7 @@ pub struct Step;
 
 impl crate::step::Step for Step {
     const NAME: &'static str = "simplify-fit";
-    const REVISION: u32 = 8;
+    const REVISION: u32 = 9;
     const INPUTS: &'static [InputDef] = &[
         InputDef { name: "from", accepts: &[Port::Surface], required: true, doc: "the surface to simplify" },
         InputDef {

@@ -151,6 +151,10 @@ pub struct SimplifyFitStats {
     pub removed: f64,
     /// Operations by case.
     pub operations: Operations,
+    /// Whether needles got no new vertices, since these made more needles, or more faces than there were: everything told
+    /// here is of a second run without them. Absent where false.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub without_new_vertices: bool,
     /// Trial fits of spheres.
     pub spheres: Trials,
     /// Trial fits of cylinders.
@@ -337,6 +341,7 @@ pub(super) fn quality(
         target_faces: count,
         removed: 0.0,
         operations: Operations::default(),
+        without_new_vertices: false,
         spheres: Trials::default(),
         cylinders: Trials::default(),
         fillets: Vec::new(),

@@ -46,11 +46,32 @@ impl Collision {
     /// that are known to be one sheet do not meet each other.
     pub fn hits(&mut self, mesh: &HalfedgeMesh, old: &[FaceId], new: &[[DVec3; 3]], is_sheet: bool) -> bool {
         let is_sheet = is_sheet || self.star.sees_sheet(new);
-        for (i, &a) in new.iter().enumerate().filter(|_| !is_sheet) {
-            if new[..i].iter().any(|&b| !clearly_apart(a, b) && triangle_triangle(a, b).is_intersection()) {
-                return true;
-            }
-        }
+        !is_sheet && meet_each_other(new) || self.first_hit(mesh, old, new, |_| false)
+    }
+
+    /// As [`Collision::hits`], for new faces that are the old ones cut otherwise: where those met one another, or a face
+    /// that stays, the new ones may too. Even here faces must be tested, since a new corner is rounded off the old faces,
+    /// and the other side of a needle or of a thin sheet is nearer than that.
+    pub fn hits_more(
+        &mut self,
+        mesh: &HalfedgeMesh,
+        old: &[FaceId],
+        was: impl Fn(FaceId) -> [DVec3; 3],
+        new: &[[DVec3; 3]],
+    ) -> bool {
+        let olds = || old.iter().map(|&f| was(f));
+        let met_itself = || meet_each_other(&olds().collect::<Vec<_>>());
+        meet_each_other(new) && !met_itself() || self.first_hit(mesh, old, new, |b| olds().any(|a| meet(a, b)))
+    }
+
+    /// Whether a new face meets one that stays, past those that `excused` names.
+    fn first_hit(
+        &mut self,
+        mesh: &HalfedgeMesh,
+        old: &[FaceId],
+        new: &[[DVec3; 3]],
+        excused: impl Fn([DVec3; 3]) -> bool,
+    ) -> bool {
         self.new_boxes.clear();
         self.new_boxes.extend(new.iter().map(|points| self.tree.box_of(points)));
         let all = self.new_boxes.iter().fold(SmallBox::EMPTY, |all, &own| all.union(own));
@@ -62,10 +83,21 @@ impl Collision {
                     return false;
                 }
                 let b = *other.get_or_insert_with(|| face.corners.map(|v| mesh.point(v)));
-                !clearly_apart(a, b) && triangle_triangle(a, b).is_intersection()
+                meet(a, b) && !excused(b)
             })
         })
     }
+}
+
+/// Whether two of the faces meet beyond a shared corner or edge.
+fn meet_each_other(faces: &[[DVec3; 3]]) -> bool {
+    faces.iter().enumerate().any(|(i, &a)| faces[..i].iter().any(|&b| meet(a, b)))
+}
+
+/// Whether two faces meet beyond a shared corner or edge.
+#[inline]
+fn meet(a: [DVec3; 3], b: [DVec3; 3]) -> bool {
+    !clearly_apart(a, b) && triangle_triangle(a, b).is_intersection()
 }
 
 /// Whether two triangles clearly meet nowhere but in the corners they share: the common case, without exact numbers.

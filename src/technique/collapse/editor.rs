@@ -407,11 +407,14 @@ impl<'a> Editor<'a> {
             }
             is_sheet = envelope.is_sheet();
         }
-        if !patch.is_same && self.collision.hits(&self.mesh, &patch.old, &patch.points, is_sheet) {
-            self.counts.collisions += 1;
-            return false;
-        }
-        true
+        let (mesh, collision) = (&self.mesh, &mut self.collision);
+        let hits = if patch.is_same {
+            collision.hits_more(mesh, &patch.old, |f| mesh.corner_points(f), &patch.points)
+        } else {
+            collision.hits(mesh, &patch.old, &patch.points, is_sheet)
+        };
+        self.counts.collisions += usize::from(hits);
+        !hits
     }
 
     pub(super) fn apply_collapse(&mut self, plan: &CollapsePlan, p: DVec3) {

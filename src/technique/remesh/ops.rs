@@ -273,3 +273,29 @@ fn least_sine([a, b, c]: [DVec3; 3]) -> f64 {
     let longer = (x * y).max(y * z).max(z * x);
     if longer > 0.0 { ((b - a).cross(c - a).length_squared() / longer).sqrt() } else { 0.0 }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::halfedge::tests::{enter, surface};
+    use crate::technique::collapse::limits::{Limits, SizeField};
+
+    /// Two faces over an edge, and a third one so near that a new corner beside the edge would lie past it.
+    fn split_under(ceiling: [[f64; 3]; 3]) -> Option<VertexId> {
+        let low = [[0.0; 3], [1.0, 0.0, 0.0], [0.5, 1.0, 0.0], [0.5, -1.0, 0.0]];
+        let mesh = enter(&surface(&[&low[..], &ceiling].concat(), &[[0, 1, 2], [1, 0, 3], [4, 5, 6]]));
+        let shared = mesh.edges().find(|&e| !mesh.is_boundary_edge(e)).expect("the two faces share an edge");
+        let limits = Limits { min_stretch: 0.0, max_size: SizeField::Uniform(f64::INFINITY), max_valence: 9 };
+        let mut editor = Editor::new(mesh, Keeper::QuadricRms { most: 1.0 }, limits, 1.0);
+        editor.try_split(shared, DVec3::new(0.5, 0.0, 1e-13))
+    }
+
+    #[test]
+    fn a_rounded_corner_does_not_pierce_the_other_side() {
+        let above = |z: f64| [[0.4, -0.1, z], [0.6, -0.1, z], [0.5, 0.2, z]];
+        assert_eq!(split_under(above(1e-14)), None);
+        assert!(split_under(above(1e-12)).is_some(), "out of reach");
+        let through = [[0.4, 0.1, -1.0], [0.6, 0.1, -1.0], [0.5, 0.1, 1.0]];
+        assert!(split_under(through).is_some(), "the faces met before");
+    }
+}
