@@ -87,3 +87,9 @@ pub(super) fn mean_side(mesh: &Mixed, f: u32) -> f64 {
     let (sum, n) = mesh.sides(f).fold((0.0, 0.0), |(sum, n), h| (sum + mesh.length(h), n + 1.0));
     sum / n
 }
+
+/// The mean length of the sides that a face is to have.
+pub(super) fn mean_size(mesh: &Mixed, f: u32) -> f64 {
+    let corners = mesh.corners(f);
+    corners.iter().map(|&v| mesh.size(v)).sum::<f64>() / corners.len() as f64
+}

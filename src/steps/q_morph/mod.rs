@@ -15,7 +15,7 @@
 //! The distance between triangles and surface is certified both ways first, and sizes are lowered where it is too large.
 //! The same is done with the finished quads: where they are too far away, single vertices are moved over the ridges and
 //! tips that a face cuts off (`settle`); where that is not enough, or shapes are poor, sizes are lowered there and the
-//! front runs again in the regions that changed. The best of a few attempts is kept (`attempts`).
+//! front runs again in the regions that changed. The best of a few attempts is kept (`attempts`, `search`).
 //!
 //! # Invariants
 //! - Curves stay chains of edges between the same nodes, and nodes stay where they are; borders of regions that
@@ -33,8 +33,10 @@
 mod attempts;
 mod carry;
 mod check;
+mod lack;
 mod midpoint;
 mod reuse;
+mod search;
 mod settle;
 mod sizes;
 
@@ -285,7 +287,7 @@ pub struct Step;
 
 impl StepContract for Step {
     const NAME: &'static str = "q-morph";
-    const REVISION: u32 = 11;
+    const REVISION: u32 = 12;
     const INPUTS: &'static [InputDef] = &[InputDef {
         name: "from",
         accepts: &[Port::Surface],
