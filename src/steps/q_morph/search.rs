@@ -163,3 +163,16 @@ impl Asked {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_got_better_is_asked_for_afresh() {
+        let asked = Asked { failures: vec![1, 1, 0, 0], regions: vec![true, true, true, false] };
+        let onwards = asked.after(&[1.0, 1.0, 1.0, 1.0], Some(&[0.5, 2.0, 1.0, 1.0]));
+        assert_eq!(onwards.failures, [0, 2, 1, 0], "better, worse, asked in vain, not asked");
+        assert_eq!(asked.after(&[1.0; 4], None).failures, [2, 2, 1, 0]);
+    }
+}

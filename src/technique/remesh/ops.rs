@@ -292,7 +292,7 @@ mod tests {
 
     #[test]
     fn a_rounded_corner_does_not_pierce_the_other_side() {
-        let above = |z: f64| [[0.4, -0.1, z], [0.6, -0.1, z], [0.5, 0.2, z]];
+        let above = |z: f64| [[0.4, -0.1, z], [2.0, -0.1, z], [0.5, 0.2, z]];
         assert_eq!(split_under(above(1e-14)), None);
         assert!(split_under(above(1e-12)).is_some(), "out of reach");
         let through = [[0.4, 0.1, -1.0], [0.6, 0.1, -1.0], [0.5, 0.1, 1.0]];
