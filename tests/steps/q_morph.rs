@@ -173,6 +173,7 @@ fn a_part_comes_within_the_tolerance_with_sound_shapes() {
     let diagonal = Aabb::of(quads.mesh.points.iter().copied()).diagonal();
     let number = |name: &str| stats[name].as_f64().unwrap();
     assert!(number("distance") <= 0.003 * diagonal, "{} from the surface", number("distance"));
+    assert!(number("curve-distance") <= 0.0011 * diagonal, "{} from the curves", number("curve-distance"));
     assert!(number("min-scaled-jacobian") >= 0.5, "the worst quad is {}", number("min-scaled-jacobian"));
     assert_eq!(stats["triangles"], 0);
 }

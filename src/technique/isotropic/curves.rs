@@ -201,18 +201,25 @@ impl Remesher<'_, '_> {
             let curve = &self.ground.curves[arc];
             let sizes: Vec<(f64, f64)> = chain.iter().map(|&(at, v)| (at, self.mesh.size(v))).collect();
             let places = respread(&sizes, curve.length(), chain.len() - 1);
-            let sag = |at: &mut dyn Iterator<Item = f64>| {
-                let at: Vec<f64> = at.collect();
-                at.windows(2).map(|pair| curve.sag(pair[0], pair[1])).fold(0.0, f64::max)
-            };
-            let after = sag(&mut places.iter().copied());
-            let spoils = after > self.rules.curve_tolerance && after > sag(&mut chain.iter().map(|&(at, _)| at));
-            if places.len() != chain.len() || spoils {
+            let sag = |at: &[f64]| at.windows(2).map(|pair| curve.sag(pair[0], pair[1])).fold(0.0, f64::max);
+            let before: Vec<f64> = chain.iter().map(|&(at, _)| at).collect();
+            let most = sag(&before).max(self.rules.curve_tolerance);
+            if places.len() != chain.len() || sag(&places) > most {
                 continue;
             }
+            let mut reached = before.clone();
             for k in 1..chain.len() - 1 {
-                let at = places[k];
-                self.try_move(chain[k].1, curve.at(at), glam::DVec3::ZERO, Place::Arc { arc: arc as u32, at });
+                let place = Place::Arc { arc: arc as u32, at: places[k] };
+                if self.try_move(chain[k].1, curve.at(places[k]), glam::DVec3::ZERO, place) {
+                    reached[k] = places[k];
+                }
+            }
+            // Where some may not move, edges between these and the others can be too long for the curve.
+            if sag(&reached) > most {
+                for (&at, &(_, v)) in before.iter().zip(&chain).take(chain.len() - 1).skip(1) {
+                    self.mesh.set_point(v, curve.at(at), glam::DVec3::ZERO);
+                    self.mesh.set_place(v, Place::Arc { arc: arc as u32, at });
+                }
             }
         }
     }
