@@ -2,7 +2,8 @@
 //!
 //! Smaller faces in one region change its curves, and with them the regions beside it, for better or worse. So an attempt
 //! that is worse than the best is not thrown away at once: a few more go on from it and mend what it made worse. When they
-//! come to nothing, the best is asked for still smaller faces in those regions; where that fails too, they are left alone.
+//! come to nothing, the next starts from the best again: still smaller faces are asked of regions that failed once, none of
+//! those that failed twice.
 
 use std::cmp::Ordering;
 
@@ -16,7 +17,7 @@ use crate::technique::mixed::NONE;
 const DETOUR: usize = 3;
 /// Faces below this shape are not worth smaller ones for the sake of distance.
 const USEFUL: f64 = 0.2;
-/// A region is left alone after so many attempts that made it worse.
+/// A region is left alone after so many attempts that did not make it better, or others worse for its sake.
 const FAILURES: u8 = 2;
 /// The part of the size that the second of them asks for.
 const AGAIN: f64 = 0.75;

@@ -49,9 +49,9 @@ impl Collision {
         !is_sheet && meet_each_other(new) || self.first_hit(mesh, old, new, |_| false)
     }
 
-    /// As [`Collision::hits`], for new faces that are the old ones cut otherwise: where those met one another, or a face
-    /// that stays, the new ones may too. Even here faces must be tested, since a new corner is rounded off the old faces,
-    /// and the other side of a needle or of a thin sheet is nearer than that.
+    /// As [`Collision::hits`], for new faces that are the old ones cut otherwise: where one of those met another, or a face
+    /// that stays, any of the new ones may meet the same. Even here faces must be tested, since a new corner is rounded off
+    /// the old faces, and the other side of a needle or of a thin sheet is nearer than that.
     pub fn hits_more(
         &mut self,
         mesh: &HalfedgeMesh,
