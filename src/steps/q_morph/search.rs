@@ -146,8 +146,8 @@ impl Asked {
         next
     }
 
-    /// What to ask instead, after an attempt that was not better: not for the sake of regions at whose borders others got
-    /// worse, and for still smaller faces in those that did not get better themselves.
+    /// Counts a failure, after an attempt that was not better, for the regions asked that did not get better or border on one
+    /// that got worse; for all where that is none.
     fn blame(&mut self, before: &[f64], after: Option<&[f64]>, ground: &Ground<'_>) {
         let is_worse = |r: usize| after.is_some_and(|after| after[r] > before[r]);
         let mut spoils = vec![false; before.len()];
