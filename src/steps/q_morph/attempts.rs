@@ -1,11 +1,13 @@
 //! From the surface to clean quads, tried again with smaller sizes where distance or shapes are not good enough.
 //!
 //! Every attempt starts from an earlier one ([`search`](super::search)) and makes only those regions anew whose triangles
-//! changed.
+//! changed. Where none of them is good enough, small pieces of the best are meshed anew ([`rework`](super::rework)), and a
+//! few more attempts go on from there, each with such pieces.
 
 use super::check::{Check, Fault, mean_side, smaller};
 use super::lack::lack;
 use super::reuse::{Attempt, signs, take_over};
+use super::rework::Rework;
 use super::search::Search;
 use super::settle::settle;
 use super::{QMorphError, QMorphParams, QMorphStats, sizes};
@@ -17,8 +19,8 @@ use crate::technique::join::{join_along_paths, join_neighbours};
 use crate::technique::mixed::Mixed;
 use crate::watch::{Cancelled, Watch};
 
-/// How often sizes are lowered where the quads prove too far from the surface or of poor shape.
-const ATTEMPTS: usize = 12;
+/// How often poor places of an attempt are gone through.
+const REWORKS: usize = 2;
 /// How often sizes are lowered beforehand, where the triangles are too far from the surface.
 const PREPARATIONS: usize = 4;
 /// The part of the tolerance that triangles may use.
@@ -36,10 +38,11 @@ pub(super) fn morph(
     scale: f64,
     watch: &Watch,
 ) -> Result<(Mixed, QMorphStats), QMorphError> {
-    let stats = QMorphStats { regions: ground.region_count(), left_out: ground.left_out, ..QMorphStats::default() };
-    let check = Check::new(ground);
+    let regions = ground.region_count();
+    let stats = QMorphStats { regions, left_out: ground.left_out, attempts: 1, ..QMorphStats::default() };
+    let check = Check::new(ground, watch)?;
     let work = Morpher { ground, params, check: &check, scale, watch };
-    let mut best = work.attempts(rules, ATTEMPTS, &stats)?;
+    let mut best = work.attempts(rules, &stats)?;
     // Many pieces on a curve that is rough may be what broke it: none shorter than the least size, then a looser curve.
     let longer = Rules { shortest: rules.least_size, ..rules };
     let looser = Rules { curve_tolerance: LOOSER * rules.curve_tolerance, ..longer };
@@ -47,7 +50,7 @@ pub(super) fn morph(
         if best.lack < BROKEN {
             break;
         }
-        let other = work.attempts(rules, ATTEMPTS, &stats)?;
+        let other = work.attempts(rules, &stats)?;
         let attempts = best.stats.attempts + other.stats.attempts;
         if other.lack < best.lack {
             best = other;
@@ -70,31 +73,82 @@ struct Morpher<'a, 'g> {
 }
 
 impl Morpher<'_, '_> {
-    /// Remeshes, and runs the front at most so many times, with smaller sizes where quads prove too far away or poor.
-    fn attempts(&self, rules: Rules, most: usize, stats: &QMorphStats) -> Result<Attempt, QMorphError> {
-        let (ground, watch) = (self.ground, self.watch);
+    /// Remeshes, runs the front, and does again what is not good enough.
+    fn attempts(&self, rules: Rules, stats: &QMorphStats) -> Result<Attempt, QMorphError> {
+        let (ground, watch, most) = (self.ground, self.watch, self.params.attempts.max(1));
         let mut mesh = ground.workshop().ok_or(QMorphError::NotManifold)?;
         sizes::set(&mut mesh, ground.surface, self.params, self.scale).map_err(QMorphError::Size)?;
         watch.phase("remeshing between the curves", None);
         remesh(&mut mesh, ground, rules, watch)?;
         prepare(&mut mesh, ground, self.check, rules, watch)?;
-        let best = self.attempt(mesh, None, rules, stats)?.ok_or(QMorphError::Empty)?;
-        let mut search = Search::new(best);
-        let mut attempts = 1;
-        while attempts < most {
-            let places = search.places(rules.tolerance);
+        let first = self.attempt(mesh, None, rules, stats)?.ok_or(QMorphError::Empty)?;
+        let mut best = self.improve(first, most, rules, stats, false)?;
+        if most > 1 {
+            best.awake.fill(true);
+            self.rework(&mut best, rules)?;
+        }
+        if best.lack > 0.0 {
+            best = self.improve(best, most.div_ceil(2), rules, stats, true)?;
+        }
+        Ok(best)
+    }
+
+    /// Lowers sizes where faces prove too far away or poor, as long as that helps, and runs the front there again, with
+    /// poor places meshed anew if `reworks`. The first attempt counts as one of the `most`.
+    fn improve(
+        &self,
+        first: Attempt,
+        most: usize,
+        rules: Rules,
+        stats: &QMorphStats,
+        reworks: bool,
+    ) -> Result<Attempt, QMorphError> {
+        let (ground, watch) = (self.ground, self.watch);
+        let mut attempts = first.stats.attempts;
+        let mut search = Search::new(first);
+        for _ in 1..most {
+            let places = search.places(rules);
             if places.is_empty() {
                 break;
             }
             let mut mesh = search.from().triangles.clone();
             tighten(&mut mesh, ground, rules, &places, watch)?;
-            let next = self.attempt(mesh, Some(search.from()), rules, stats)?;
+            let mut next = self.attempt(mesh, Some(search.from()), rules, stats)?;
+            if let Some(next) = next.as_mut().filter(|_| reworks) {
+                self.rework(next, rules)?;
+            }
             search.learn(next, ground);
             attempts += 1;
         }
         let mut best = search.into_best();
         best.stats.attempts = attempts;
         Ok(best)
+    }
+
+    /// Meshes poor places of an attempt anew, in regions that it made.
+    fn rework(&self, attempt: &mut Attempt, rules: Rules) -> Result<(), Cancelled> {
+        self.watch.phase("meshing poor places anew", None);
+        let rework = Rework { ground: self.ground, check: self.check, rules, watch: self.watch };
+        for _ in 0..REWORKS {
+            let reworked = rework.run(&mut attempt.quads, &mut attempt.flaws, &attempt.awake)?;
+            if reworked == 0 {
+                break;
+            }
+            attempt.stats.reworked += reworked;
+            attempt.quads.compact();
+            self.settle(attempt, rules)?;
+        }
+        Ok(())
+    }
+
+    /// Moves vertices of an attempt nearer to the surface, in regions that it made, and judges what it came to.
+    fn settle(&self, attempt: &mut Attempt, rules: Rules) -> Result<(), Cancelled> {
+        let Attempt { quads, awake, .. } = attempt;
+        settle(quads, self.ground, self.check, rules.tolerance, awake, self.watch)?;
+        // In all regions: the face nearest to a place may belong to another region than the place.
+        attempt.flaws = self.check.flaws(quads, rules.tolerance, self.watch)?;
+        (attempt.lack, attempt.by_region) = lack(quads, &attempt.flaws.faults, rules.tolerance, awake.len());
+        Ok(())
     }
 
     /// From triangles to settled quads; with what the attempt before left where nothing changed. `None` where nothing
@@ -122,15 +176,14 @@ impl Morpher<'_, '_> {
                 (quads, awake) = taken;
                 let done = &earlier.stats;
                 (stats.levels, stats.seams, stats.clean_edits) = (done.levels.clone(), done.seams, done.clean_edits);
+                stats.reworked = done.reworked;
             }
         }
         advance_and_clean(&mut quads, ground, rules, &awake, &mut stats, watch)?;
         stats.clean_edits += finish(&mut quads, ground, rules.curve_tolerance, &awake, watch)?.edits;
-        settle(&mut quads, ground, self.check, rules.tolerance, &awake, watch)?;
-        // In all regions: the face nearest to a place may belong to another region than the place.
-        let faults = self.check.beyond(&quads, rules.tolerance, &vec![true; stats.regions], watch)?;
-        let (lack, by_region) = lack(&quads, &faults, rules.tolerance, stats.regions);
-        Ok(Some(Attempt { triangles, signs, quads, faults, lack, by_region, stats }))
+        let mut attempt = Attempt { triangles, signs, awake, quads, stats, ..Attempt::default() };
+        self.settle(&mut attempt, rules)?;
+        Ok(Some(attempt))
     }
 }
 

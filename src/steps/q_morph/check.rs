@@ -1,9 +1,13 @@
 //! How far quads and surface are apart, certified both ways, and where sizes must get smaller for it.
 
 use glam::DVec3;
+use rustc_hash::FxHashSet;
 
+use crate::mesh::FaceId;
 use crate::mesh::bvh::SegmentBvh;
+use crate::mesh::geometry::Aabb;
 use crate::metric::distance::{Target, decide_where, upper_bound};
+use crate::metric::intersection::{faces_of, self_intersections};
 use crate::technique::ground::Ground;
 use crate::technique::mixed::Mixed;
 use crate::watch::{Cancelled, Watch};
@@ -15,6 +19,8 @@ pub(super) struct Check {
     pub(super) corners: SegmentBvh,
     /// The region of each of its faces.
     regions: Vec<u32>,
+    /// Whether it meets itself nowhere, so that quads should not either.
+    is_simple: bool,
 }
 
 /// A place where quads and surface are too far apart.
@@ -28,11 +34,57 @@ pub(super) struct Fault {
     pub(super) distance: f64,
 }
 
+/// What is wrong with quads beside their shapes.
+#[derive(Default)]
+pub(super) struct Flaws {
+    /// Where they are too far from the surface.
+    pub(super) faults: Vec<Fault>,
+    /// Faces that others pass through, in order; none where the surface itself meets itself.
+    pub(super) crossing: Vec<u32>,
+}
+
 impl Check {
-    pub(super) fn new(ground: &Ground<'_>) -> Self {
+    pub(super) fn new(ground: &Ground<'_>, watch: &Watch) -> Result<Self, Cancelled> {
         let surface = ground.surface;
         let corners = SegmentBvh::new(surface.points.iter().map(|&p| [p, p]).collect());
-        Self { surface: Target::of(&surface.to_soup()), corners, regions: ground.regions.clone() }
+        let soup = surface.to_soup();
+        let is_simple = self_intersections(&soup, watch)?.is_empty();
+        Ok(Self { surface: Target::of(&soup), corners, regions: ground.regions.clone(), is_simple })
+    }
+
+    /// All flaws of a mesh.
+    pub(super) fn flaws(&self, mesh: &Mixed, tolerance: f64, watch: &Watch) -> Result<Flaws, Cancelled> {
+        let all = vec![true; self.regions.iter().max().map_or(0, |&last| last as usize + 1)];
+        let faults = self.beyond(mesh, tolerance, &all, watch)?;
+        let faces: Vec<u32> = mesh.faces().collect();
+        Ok(Flaws { faults, crossing: self.crossing(mesh, &faces, watch)? })
+    }
+
+    /// The flaws of some faces of one region, as they lie beside the others.
+    pub(super) fn flaws_near(
+        &self,
+        mesh: &Mixed,
+        tolerance: f64,
+        faces: &[u32],
+        ground: &Ground<'_>,
+        watch: &Watch,
+    ) -> Result<Flaws, Cancelled> {
+        let area = Aabb::of(faces.iter().flat_map(|&f| mesh.corners(f)).map(|v| mesh.point(v)));
+        let reaches = |&f: &u32| Aabb::of(mesh.corners(f).iter().map(|&v| mesh.point(v))).overlaps(&area);
+        let near: Vec<u32> = mesh.faces().filter(reaches).collect();
+        let inside: FxHashSet<u32> = faces.iter().copied().collect();
+        let mut crossing = self.crossing(mesh, &near, watch)?;
+        crossing.retain(|f| inside.contains(f));
+        Ok(Flaws { faults: self.beyond_near(mesh, tolerance, &inside, &area, ground, watch)?, crossing })
+    }
+
+    /// Those of these faces that pass through each other.
+    fn crossing(&self, mesh: &Mixed, faces: &[u32], watch: &Watch) -> Result<Vec<u32>, Cancelled> {
+        if !self.is_simple {
+            return Ok(Vec::new());
+        }
+        let pairs = self_intersections(&mesh.soup_of(faces), watch)?;
+        Ok(faces_of(&pairs).into_iter().map(|f| faces[f.index()]).collect())
     }
 
     /// The places where the mesh and the surface are farther apart than `tolerance`, by a witness in each face at fault,
@@ -44,17 +96,45 @@ impl Check {
         awake: &[bool],
         watch: &Watch,
     ) -> Result<Vec<Fault>, Cancelled> {
+        let ours = |f: u32| awake[mesh.region(f) as usize];
+        let theirs = |f: FaceId| awake[self.regions[f.index()] as usize];
+        self.beyond_where(mesh, tolerance, &ours, &theirs, watch)
+    }
+
+    /// The same for some faces of a region, and the surface's faces of that region that reach into their box.
+    fn beyond_near(
+        &self,
+        mesh: &Mixed,
+        tolerance: f64,
+        inside: &FxHashSet<u32>,
+        area: &Aabb,
+        ground: &Ground<'_>,
+        watch: &Watch,
+    ) -> Result<Vec<Fault>, Cancelled> {
+        let area = area.grown(tolerance);
+        let is_region = |region: u32| inside.iter().any(|&f| mesh.region(f) == region);
+        let reaches = |f: FaceId| Aabb::of(ground.surface.corners(f)).overlaps(&area);
+        let theirs = |f: FaceId| reaches(f) && is_region(self.regions[f.index()]);
+        self.beyond_where(mesh, tolerance, &|f| inside.contains(&f), &theirs, watch)
+    }
+
+    fn beyond_where(
+        &self,
+        mesh: &Mixed,
+        tolerance: f64,
+        ours: &(dyn Fn(u32) -> bool + Sync),
+        theirs: &(dyn Fn(FaceId) -> bool + Sync),
+        watch: &Watch,
+    ) -> Result<Vec<Fault>, Cancelled> {
         let quads = Target::of(&mesh.leave().0);
         let faces: Vec<u32> = mesh.faces().collect();
         let mut found = Vec::new();
-        let ours = |f: crate::mesh::FaceId| awake[mesh.region(faces[f.index()]) as usize];
-        let theirs = |f: crate::mesh::FaceId| awake[self.regions[f.index()] as usize];
-        let decision = decide_where(&quads, &self.surface, tolerance, &ours, watch)?;
+        let decision = decide_where(&quads, &self.surface, tolerance, &|f| ours(faces[f.index()]), watch)?;
         for (face, p, distance) in decision.into_iter().flat_map(|d| d.beyond) {
             let at = self.surface.bvh().closest(p).map_or(p, |c| c.nearest.point);
             found.push(Fault { face: faces[face.index()], at, distance });
         }
-        let decision = decide_where(&self.surface, &quads, tolerance, &theirs, watch)?;
+        let decision = decide_where(&self.surface, &quads, tolerance, theirs, watch)?;
         for (_, at, distance) in decision.into_iter().flat_map(|d| d.beyond) {
             if let Some(nearest) = quads.bvh().closest(at) {
                 found.push(Fault { face: faces[quads.face(nearest.index).index()], at, distance });

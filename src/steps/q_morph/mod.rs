@@ -15,7 +15,8 @@
 //! The distance between triangles and surface is certified both ways first, and sizes are lowered where it is too large.
 //! The same is done with the finished quads: where they are too far away, single vertices are moved over the ridges and
 //! tips that a face cuts off (`settle`); where that is not enough, or shapes are poor, sizes are lowered there and the
-//! front runs again in the regions that changed. The best of a few attempts is kept (`attempts`, `search`).
+//! front runs again in the regions that changed (`attempts`, `search`), or in a small piece about the place, whose rim
+//! stays (`rework`, `patch`). The best that was reached is kept.
 //!
 //! # Invariants
 //! - Curves stay chains of edges between the same nodes, and nodes stay where they are; borders of regions that
@@ -35,7 +36,9 @@ mod carry;
 mod check;
 mod lack;
 mod midpoint;
+mod patch;
 mod reuse;
+mod rework;
 mod search;
 mod settle;
 mod sizes;
@@ -90,6 +93,10 @@ pub struct QMorphParams {
     /// Whether there must be no triangle. Default true; false leaves one in each region with an odd number of border
     /// edges, and no curve gets an edge more for it.
     pub all_quad: bool,
+    /// How often the front may run where distance or shapes are not good enough: so often over whole regions, and half as
+    /// often again with small pieces about poor places meshed anew. Default 12; 1 takes what the first run gives.
+    #[schemars(range(min = 1, max = 1000))]
+    pub attempts: usize,
     /// The step fails before it begins if the result would have more faces. Default 20 million.
     #[schemars(range(min = 1))]
     pub max_faces: usize,
@@ -106,6 +113,7 @@ impl Default for QMorphParams {
             curve_tolerance: Length::Percent(0.1),
             border_angle: 30.0,
             all_quad: true,
+            attempts: 12,
             max_faces: 20_000_000,
         }
     }
@@ -135,6 +143,8 @@ pub struct QMorphStats {
     pub seams: usize,
     /// Edits of the clean-up.
     pub clean_edits: usize,
+    /// Pieces of quads that were meshed anew.
+    pub reworked: usize,
     /// Least scaled Jacobian.
     pub min_scaled_jacobian: f64,
     /// The sharpest angle between two curves next to each other at a node, in degrees; a corner there is no wider, so
@@ -287,7 +297,7 @@ pub struct Step;
 
 impl StepContract for Step {
     const NAME: &'static str = "q-morph";
-    const REVISION: u32 = 12;
+    const REVISION: u32 = 13;
     const INPUTS: &'static [InputDef] = &[InputDef {
         name: "from",
         accepts: &[Port::Surface],

@@ -6,22 +6,25 @@ use glam::DVec3;
 use rustc_hash::{FxHashMap, FxHasher};
 
 use super::QMorphStats;
-use super::check::Fault;
+use super::check::Flaws;
 use crate::mesh::{Facet, Soup, VertexId, edge_key};
 use crate::technique::ground::Ground;
 use crate::technique::isotropic::chains;
 use crate::technique::mixed::{Mixed, NONE, Place};
 
 /// What an attempt began with and what it came to.
+#[derive(Default)]
 pub(super) struct Attempt {
     /// The triangles before regions were made even.
     pub(super) triangles: Mixed,
     /// A number for the even triangles of each region.
     pub(super) signs: Vec<u64>,
+    /// Whether it made each region; the others are taken over.
+    pub(super) awake: Vec<bool>,
     /// The finished quads.
     pub(super) quads: Mixed,
-    /// Where they are too far from the surface.
-    pub(super) faults: Vec<Fault>,
+    /// What is wrong with them beside their shapes.
+    pub(super) flaws: Flaws,
     /// How much they lack: 0 where they hold to the tolerance with sound shapes.
     pub(super) lack: f64,
     /// The same by region.

@@ -11,6 +11,7 @@ use super::check::{Wish, mean_side, mean_size, smaller};
 use super::lack::shortfall;
 use super::reuse::Attempt;
 use crate::technique::ground::Ground;
+use crate::technique::isotropic::Rules;
 use crate::technique::mixed::NONE;
 
 /// How many attempts go on from one that is worse than the best.
@@ -58,37 +59,40 @@ impl Search {
     }
 
     /// Where the next attempt should have smaller faces; nowhere where no more should be made.
-    pub(super) fn places(&mut self, tolerance: f64) -> Vec<Wish> {
+    pub(super) fn places(&mut self, rules: Rules) -> Vec<Wish> {
         if let Some(detour) = &mut self.detour {
-            let places = detour.asked.places(&detour.reached, tolerance);
+            let places = detour.asked.places(&detour.reached, rules);
             if !places.is_empty() {
                 return places;
             }
             self.detour = None;
         }
-        self.asked.places(&self.best, tolerance)
+        self.asked.places(&self.best, rules)
     }
 
     /// Takes in what became of the attempt at those places; `None` where nothing changed.
     pub(super) fn learn(&mut self, next: Option<Attempt>, ground: &Ground<'_>) {
-        let (from, asked, steps) = match &self.detour {
-            Some(detour) => (&detour.reached, &detour.asked, detour.steps),
-            None => (&self.best, &self.asked, 0),
+        let (from, asked) = match &self.detour {
+            Some(detour) => (&detour.reached, &detour.asked),
+            None => (&self.best, &self.asked),
         };
         let onwards = asked.after(&from.by_region, next.as_ref().map(|next| &*next.by_region));
-        match next {
-            Some(next) if next.is_better_than(&self.best) => {
+        match (next, &mut self.detour) {
+            (Some(next), _) if next.is_better_than(&self.best) => {
                 *self = Self { best: next, asked: onwards, detour: None };
             }
-            Some(next) if steps < DETOUR => {
-                if steps == 0 {
-                    self.asked.blame(&self.best.by_region, Some(&next.by_region), ground);
-                }
-                self.detour = Some(Detour { reached: next, asked: onwards, steps: steps + 1 });
+            (Some(next), None) => {
+                self.asked.blame(&self.best.by_region, Some(&next.by_region), ground);
+                self.detour = Some(Detour { reached: next, asked: onwards, steps: 1 });
             }
-            _ => {
-                self.asked.blame(&self.best.by_region, None, ground);
-                self.detour = None;
+            (None, None) => self.asked.blame(&self.best.by_region, None, ground),
+            // What led here was blamed when the detour began.
+            (_, Some(detour)) if detour.steps == DETOUR => self.detour = None,
+            (next, Some(detour)) => {
+                if let Some(next) = next {
+                    detour.reached = next;
+                }
+                (detour.asked, detour.steps) = (onwards, detour.steps + 1);
             }
         }
     }
@@ -101,25 +105,27 @@ struct Asked {
     failures: Vec<u8>,
     /// The regions that the attempt asked for is to make better.
     regions: Vec<bool>,
+    /// What was asked for last.
+    wishes: Vec<Wish>,
 }
 
 impl Asked {
     fn new(regions: usize) -> Self {
-        Self { failures: vec![0; regions], regions: vec![false; regions] }
+        Self { failures: vec![0; regions], regions: vec![false; regions], wishes: Vec::new() }
     }
 
     /// Where the next attempt should have smaller faces: at faults of sound faces, and at poor faces, whose strips get
     /// more room for good ones. Where one failed, still smaller; not in regions where two did.
-    fn places(&mut self, from: &Attempt, tolerance: f64) -> Vec<Wish> {
+    fn places(&mut self, from: &Attempt, rules: Rules) -> Vec<Wish> {
         let mesh = &from.quads;
         let wants = |f: u32| self.failures[mesh.region(f) as usize] < FAILURES;
         let again = |f: u32| libm::pow(AGAIN, f64::from(self.failures[mesh.region(f) as usize]));
         let mut asked = vec![false; self.regions.len()];
         let mut places = Vec::new();
-        for fault in from.faults.iter().filter(|fault| wants(fault.face) && mesh.quality(fault.face) > USEFUL) {
+        for fault in from.flaws.faults.iter().filter(|fault| wants(fault.face) && mesh.quality(fault.face) > USEFUL) {
             // Quads may come out larger than they were to be.
             let side = mean_side(mesh, fault.face).min(mean_size(mesh, fault.face));
-            let (at, reach, size) = smaller(mesh, fault, side, tolerance);
+            let (at, reach, size) = smaller(mesh, fault, side, rules.tolerance);
             places.push((at, reach, again(fault.face) * size));
             asked[mesh.region(fault.face) as usize] = true;
         }
@@ -129,6 +135,14 @@ impl Asked {
             places.push((mesh.centre(f), 1.2 * side, again(f) * ROOM * side));
             asked[mesh.region(f) as usize] = true;
         }
+        for (_, _, size) in &mut places {
+            *size = size.max(rules.floor);
+        }
+        // The same wishes lead to the same attempt: where sizes are at the floor, failures do not lower them.
+        if places == self.wishes {
+            return Vec::new();
+        }
+        self.wishes.clone_from(&places);
         self.regions = asked;
         places
     }
@@ -171,9 +185,61 @@ mod tests {
 
     #[test]
     fn what_got_better_is_asked_for_afresh() {
-        let asked = Asked { failures: vec![1, 1, 0, 0], regions: vec![true, true, true, false] };
+        let asked = Asked { failures: vec![1, 1, 0, 0], regions: vec![true, true, true, false], wishes: Vec::new() };
         let onwards = asked.after(&[1.0, 1.0, 1.0, 1.0], Some(&[0.5, 2.0, 1.0, 1.0]));
         assert_eq!(onwards.failures, [0, 2, 1, 0], "better, worse, asked in vain, not asked");
         assert_eq!(asked.after(&[1.0; 4], None).failures, [2, 2, 1, 0]);
+    }
+
+    /// An attempt that lacks so much in each of its regions, with a poor quad in each.
+    fn attempt(by_region: [f64; 2]) -> Attempt {
+        let bent = |x: f64| [[0.0, 0.0], [1.0, 0.0], [0.4, 0.3], [0.0, 1.0]].map(|[a, b]| glam::dvec3(x + a, b, 0.0));
+        let points: Vec<_> = [bent(0.0), bent(5.0)].concat();
+        let mut quads = crate::technique::mixed::Mixed::of_faces(&points, &[&[0, 1, 2, 3], &[4, 5, 6, 7]]).unwrap();
+        quads.set_region(1, 1);
+        Attempt { quads, lack: by_region.iter().sum(), by_region: by_region.to_vec(), ..Attempt::default() }
+    }
+
+    fn learn(search: &mut Search, next: Option<[f64; 2]>) {
+        let surface = crate::mesh::Surface::default();
+        search.learn(next.map(attempt), &Ground::new(&surface));
+    }
+
+    #[test]
+    fn a_detour_goes_on_from_worse_attempts_and_is_blamed_once() {
+        let rules =
+            Rules { tolerance: 0.1, curve_tolerance: 0.1, shortest: 0.0, least_size: 0.1, floor: 1e-3, gradation: 0.3 };
+        let mut search = Search::new(attempt([1.0, 1.0]));
+        let first = search.places(rules);
+        assert_eq!(first.len(), 2);
+        // Worse: the first region got better, the second worse.
+        learn(&mut search, Some([0.5, 2.0]));
+        assert_eq!(search.from().by_region, [0.5, 2.0], "it goes on from there");
+        assert_eq!(search.asked.failures, [0, 1]);
+        for _ in 0..2 {
+            assert!(!search.places(rules).is_empty());
+            learn(&mut search, Some([0.5, 1.9]));
+        }
+        assert!(search.detour.is_some());
+        search.places(rules);
+        learn(&mut search, Some([0.5, 1.8]));
+        assert!(search.detour.is_none(), "three steps are enough");
+        assert_eq!(search.from().by_region, [1.0, 1.0], "the best is kept");
+        assert_eq!(search.asked.failures, [0, 1], "the detour counts once");
+        let second = search.places(rules);
+        assert_eq!(second.len(), 2);
+        assert!(second[1].2 < first[1].2, "smaller where it failed");
+        learn(&mut search, Some([0.1, 0.2]));
+        assert_eq!(search.into_best().by_region, [0.1, 0.2]);
+    }
+
+    #[test]
+    fn the_same_is_not_asked_twice() {
+        let rules =
+            Rules { tolerance: 0.1, curve_tolerance: 0.1, shortest: 0.0, least_size: 9.0, floor: 9.0, gradation: 0.3 };
+        let mut search = Search::new(attempt([1.0, 1.0]));
+        assert_eq!(search.places(rules).len(), 2);
+        learn(&mut search, None);
+        assert!(search.places(rules).is_empty(), "sizes are at the floor");
     }
 }

@@ -104,6 +104,15 @@ pub fn tighten(
     Remesher { surplus: Vec::new(), asleep: Vec::new(), mesh, ground, rules }.adapt(0, &before, watch)
 }
 
+/// Remeshes a piece of a surface inside its rim, which stays as it is.
+pub fn refill(mesh: &mut Mixed, ground: &Ground<'_>, rules: Rules, watch: &Watch) -> Result<(), Cancelled> {
+    let mut work = Remesher { surplus: Vec::new(), asleep: Vec::new(), mesh, ground, rules };
+    work.grade();
+    work.rounds(watch)?;
+    mesh.compact();
+    Ok(())
+}
+
 /// Rounds of flips and smoothing only, curve vertices evenly spread, in regions that are `awake`.
 pub fn polish(mesh: &mut Mixed, ground: &Ground<'_>, rules: Rules, rounds: usize, awake: &[bool]) {
     let sleeps = |v| mesh.faces_at(v).any(|f| !awake[mesh.region(f) as usize]);
@@ -135,16 +144,7 @@ impl Remesher<'_, '_> {
         self.grade();
         self.send_to_sleep(before, &touched);
         for adaptation in 0..=times {
-            for round in 0..ROUNDS {
-                watch.check()?;
-                self.split_long();
-                let collapsed = self.collapse_short();
-                self.flip();
-                self.smooth();
-                if round >= 2 && collapsed <= self.mesh.edges().count() / QUIET {
-                    break;
-                }
-            }
+            self.rounds(watch)?;
             if self.mesh.compact() {
                 self.asleep.clear();
             }
@@ -155,6 +155,21 @@ impl Remesher<'_, '_> {
             self.grade();
             self.resample_curves(&[]);
             self.grade();
+        }
+        Ok(())
+    }
+
+    /// Rounds of edits until they are few.
+    fn rounds(&mut self, watch: &Watch) -> Result<(), Cancelled> {
+        for round in 0..ROUNDS {
+            watch.check()?;
+            self.split_long();
+            let collapsed = self.collapse_short();
+            self.flip();
+            self.smooth();
+            if round >= 2 && collapsed <= self.mesh.edges().count() / QUIET {
+                break;
+            }
         }
         Ok(())
     }

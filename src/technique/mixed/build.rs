@@ -88,6 +88,22 @@ impl Mixed {
         (soup, places, regions)
     }
 
+    /// Some faces as a soup, in their order; what they carry is left empty.
+    pub fn soup_of(&self, faces: &[u32]) -> Soup {
+        let mut number = rustc_hash::FxHashMap::default();
+        let mut soup = Soup::default();
+        for &f in faces {
+            let corners = self.corners(f);
+            let mut ids = [VertexId::from_raw(0); 4];
+            for (id, &v) in ids.iter_mut().zip(&corners) {
+                *id = *number.entry(v).or_insert_with(|| soup.points.push(self.point(v)));
+            }
+            let [a, b, c, d] = ids;
+            soup.faces.push(if corners.len() == 3 { Facet::Tri([a, b, c]) } else { Facet::Quad([a, b, c, d]) });
+        }
+        soup
+    }
+
     /// The edges on curves with the numbers that [`leave`](Self::leave) gives: ends and curve.
     pub fn arcs_left(&self) -> Vec<([VertexId; 2], u32)> {
         let mut number = vec![NONE; self.out.len()];

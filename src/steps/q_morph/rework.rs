@@ -1,0 +1,215 @@
+//! Meshes small pieces of finished quads anew, where faces are poor or too far from the surface.
+//!
+//! A region is a lottery: one more row, and the front closes elsewhere. In a piece of few rings about a poor place the
+//! draw is cheap, and what is sound everywhere else stays. The first draw that makes the place better is kept.
+
+use super::check::{Check, Fault, Flaws};
+use super::lack::{excess, lack_of, shortfall};
+use super::patch::Patch;
+use crate::technique::ground::Ground;
+use crate::technique::isotropic::Rules;
+use crate::technique::mixed::Mixed;
+use crate::watch::{Cancelled, Watch};
+
+/// Rings about a place and the part of the sizes there, as tried for poor shapes.
+///
+/// More of them cost much and rarely help: on an armadillo nine of ten that succeed are among these.
+const FOR_SHAPE: [(usize, f64); 3] = [(2, 1.0), (3, 1.0), (4, 0.7)];
+/// The same where faces are too far from the surface.
+const FOR_DISTANCE: [(usize, f64); 2] = [(2, 0.7), (3, 0.7)];
+/// Most places in one go.
+const PLACES: usize = 40;
+/// What a face weighs that another one passes through.
+const CROSSING: f64 = 0.1;
+/// A draw must take away this part of what the place lacks.
+const GAIN: f64 = 0.05;
+
+/// What the work needs.
+pub(super) struct Rework<'a, 'g> {
+    pub(super) ground: &'a Ground<'g>,
+    pub(super) check: &'a Check,
+    pub(super) rules: Rules,
+    pub(super) watch: &'a Watch,
+}
+
+impl Rework<'_, '_> {
+    /// Goes through the worst places in regions that are `awake`. Returns how many got better.
+    pub(super) fn run(&self, mesh: &mut Mixed, flaws: &mut Flaws, awake: &[bool]) -> Result<usize, Cancelled> {
+        let mut better = 0;
+        for (face, is_far) in self.places(mesh, flaws, awake).into_iter().take(PLACES) {
+            self.watch.check()?;
+            if mesh.is_face(face) && self.mend(mesh, face, is_far, flaws)? {
+                better += 1;
+            }
+        }
+        Ok(better)
+    }
+
+    /// The faces at fault, the worst first, and whether they are too far from the surface.
+    fn places(&self, mesh: &Mixed, flaws: &Flaws, awake: &[bool]) -> Vec<(u32, bool)> {
+        let wants = |f: u32| awake[mesh.region(f) as usize];
+        let mut places: Vec<(f64, u32, bool)> = Vec::new();
+        for fault in flaws.faults.iter().filter(|fault| wants(fault.face)) {
+            places.push((4.0 * excess(fault, self.rules.tolerance), fault.face, true));
+        }
+        places.extend(flaws.crossing.iter().filter(|&&f| wants(f)).map(|&f| (CROSSING, f, false)));
+        for f in mesh.faces().filter(|&f| wants(f)) {
+            let short = shortfall(mesh, f) + 10.0 * f64::from(mesh.quality(f) <= 0.0);
+            if short > 0.0 {
+                places.push((short, f, false));
+            }
+        }
+        places.sort_by(|x, y| y.0.total_cmp(&x.0).then(x.1.cmp(&y.1)).then(x.2.cmp(&y.2)));
+        places.into_iter().map(|(_, face, is_far)| (face, is_far)).collect()
+    }
+
+    /// How much some faces lack with their flaws.
+    fn lack(&self, mesh: &Mixed, faces: &[u32], flaws: &Flaws) -> f64 {
+        let crossing = CROSSING * flaws.crossing.len() as f64;
+        crossing + lack_of(mesh, faces.iter().copied(), &flaws.faults, self.rules.tolerance)
+    }
+
+    /// Draws anew about a face until one draw is better. Whether one was.
+    fn mend(&self, mesh: &mut Mixed, face: u32, is_far: bool, flaws: &mut Flaws) -> Result<bool, Cancelled> {
+        let tolerance = self.rules.tolerance;
+        let draws: &[(usize, f64)] = if is_far { &FOR_DISTANCE } else { &FOR_SHAPE };
+        for &(rings, scale) in draws {
+            let Some(patch) = Patch::around(mesh, face, rings) else { continue };
+            let before = within(flaws, &patch);
+            let lacked = self.lack(mesh, &patch.faces, &before);
+            if lacked == 0.0 {
+                return Ok(false);
+            }
+            let enough = (1.0 - GAIN) * lacked;
+            let Some(remade) = patch.remade(mesh, self.ground, self.rules, scale, self.watch)? else { continue };
+            if lack_of(&remade, remade.faces(), &[], tolerance) >= enough {
+                continue;
+            }
+            mesh.begin();
+            if let Some(made) = patch.put_back(mesh, &remade) {
+                let after = self.check.flaws_near(mesh, tolerance, &made, self.ground, self.watch)?;
+                let crosses = after.crossing.len() > before.crossing.len();
+                if !crosses && self.lack(mesh, &made, &after) < enough {
+                    mesh.commit();
+                    flaws.faults.retain(|fault| !patch.faces.contains(&fault.face));
+                    flaws.faults.extend(after.faults);
+                    flaws.crossing.retain(|f| !patch.faces.contains(f));
+                    flaws.crossing.extend(after.crossing);
+                    return Ok(true);
+                }
+            }
+            mesh.rollback();
+        }
+        Ok(false)
+    }
+}
+
+/// The flaws of a patch's faces.
+fn within(flaws: &Flaws, patch: &Patch) -> Flaws {
+    let is_inside = |f: u32| patch.faces.contains(&f);
+    let faults: Vec<Fault> = flaws.faults.iter().filter(|fault| is_inside(fault.face)).copied().collect();
+    Flaws { faults, crossing: flaws.crossing.iter().copied().filter(|&f| is_inside(f)).collect() }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::{DVec3, dvec3};
+
+    use super::*;
+    use crate::mesh::{Facet, Soup, Surface, VertexId};
+    use crate::technique::mixed::{NONE, Place};
+
+    const N: u32 = 10;
+
+    fn id(x: u32, y: u32) -> VertexId {
+        VertexId::from_raw(y * (N + 1) + x)
+    }
+
+    fn points() -> Vec<DVec3> {
+        let row = |y: u32| (0..=N).map(move |x| dvec3(f64::from(x), f64::from(y), 0.0));
+        (0..=N).flat_map(row).collect()
+    }
+
+    fn cells() -> impl Iterator<Item = [VertexId; 4]> {
+        (0..N * N).map(|i| (i % N, i / N)).map(|(x, y)| [id(x, y), id(x + 1, y), id(x + 1, y + 1), id(x, y + 1)])
+    }
+
+    /// A square of triangles.
+    fn square() -> Surface {
+        let faces: Vec<_> = cells().flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+        Surface { points: points().into(), faces: faces.into(), ..Surface::default() }
+    }
+
+    /// The same square of quads, with some vertices elsewhere.
+    fn quads(ground: &Ground<'_>, moved: &[(VertexId, DVec3)]) -> Mixed {
+        let mut points = points();
+        for &(v, to) in moved {
+            points[v.index()] = to;
+        }
+        let faces: Vec<_> = cells().map(Facet::Quad).collect();
+        let soup = Soup { points: points.into(), faces: faces.into(), ..Soup::default() };
+        let mut mesh = Mixed::new(&soup, ground.places.clone(), vec![0; (N * N) as usize], |_, _| NONE).unwrap();
+        for v in 0..mesh.vertex_slots() {
+            mesh.set_point(v, mesh.point(v), DVec3::Z);
+            mesh.set_size(v, 1.0);
+        }
+        mesh
+    }
+
+    fn rules() -> Rules {
+        Rules { tolerance: 0.1, curve_tolerance: 0.05, shortest: 0.0, least_size: 0.25, floor: 0.1, gradation: 0.3 }
+    }
+
+    fn rework(mesh: &mut Mixed, ground: &Ground<'_>) -> usize {
+        let watch = Watch::silent();
+        let check = Check::new(ground, &watch).unwrap();
+        let mut flaws = check.flaws(mesh, rules().tolerance, &watch).unwrap();
+        Rework { ground, check: &check, rules: rules(), watch: &watch }.run(mesh, &mut flaws, &[true]).unwrap()
+    }
+
+    #[test]
+    fn a_knot_is_undone_and_all_else_stays() {
+        let surface = square();
+        let ground = Ground::new(&surface);
+        // An inner vertex beyond its neighbour turns the faces between them over.
+        let knot = [(id(4, 5), dvec3(5.8, 5.4, 0.0))];
+        let mut mesh = quads(&ground, &knot);
+        let least = |mesh: &Mixed| mesh.faces().map(|f| mesh.quality(f)).fold(1.0, f64::min);
+        assert!(least(&mesh) < 0.0);
+        assert!(rework(&mut mesh, &ground) > 0);
+        assert_eq!(mesh.faults(), [] as [String; 0]);
+        assert_eq!(mesh.census().0, 0, "there are triangles");
+        assert!(least(&mesh) > 0.5, "{}", least(&mesh));
+        for v in [id(0, 0), id(0, 7), id(9, 1), id(10, 10)] {
+            assert_eq!(mesh.point(v.raw()), surface.points[v], "a vertex far from the knot moved");
+        }
+        let area: f64 = mesh.faces().map(|f| face_area(&mesh, f)).sum();
+        assert!((area - f64::from(N * N)).abs() < 1e-9, "{area}");
+    }
+
+    fn face_area(mesh: &Mixed, f: u32) -> f64 {
+        let p: Vec<DVec3> = mesh.corners(f).iter().map(|&v| mesh.point(v)).collect();
+        0.5 * (p[2] - p[0]).cross(p[3] - p[1]).z
+    }
+
+    #[test]
+    fn sound_quads_are_left_alone() {
+        let surface = square();
+        let ground = Ground::new(&surface);
+        let mut mesh = quads(&ground, &[]);
+        assert_eq!(rework(&mut mesh, &ground), 0);
+        assert_eq!(mesh.census(), (0, (N * N) as usize));
+    }
+
+    #[test]
+    fn a_patch_is_a_disk_without_bound_vertices_inside() {
+        let surface = square();
+        let ground = Ground::new(&surface);
+        let mut mesh = quads(&ground, &[]);
+        let middle = 5 * N + 5;
+        assert_eq!(Patch::around(&mesh, middle, 0).map(|patch| patch.faces), None, "one face has nothing inside");
+        assert_eq!(Patch::around(&mesh, middle, 1).unwrap().faces.len(), 9);
+        mesh.set_place(id(6, 6).raw(), Place::Node);
+        assert!(Patch::around(&mesh, middle, 2).is_none(), "a kept vertex would be lost");
+    }
+}
