@@ -182,7 +182,7 @@ pub fn control_properties(
 fn higher_mean(params: &ControlPropertiesParams, reached: f64, is_coarser: bool) -> Option<f64> {
     let missed = params.mean_stretch - reached;
     let may = optimises(params) && params.target_faces.is_none() && is_coarser;
-    (may && missed > 0.0 && missed < SLIGHTLY).then(|| params.mean_stretch + missed + SPARE)
+    (may && missed > 0.0 && missed < SLIGHTLY).then_some(params.mean_stretch + missed + SPARE)
 }
 
 /// Mends and optimises `input.surface` as [`control_properties`] does before it simplifies, then records every collapse
