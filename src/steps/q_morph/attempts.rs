@@ -47,7 +47,7 @@ pub(super) fn morph(
     let longer = Rules { shortest: rules.least_size, ..rules };
     let looser = Rules { curve_tolerance: LOOSER * rules.curve_tolerance, ..longer };
     for rules in [longer, looser] {
-        if best.lack < BROKEN {
+        if best.lack < BROKEN || params.attempts <= 1 {
             break;
         }
         let other = work.attempts(rules, &stats)?;
