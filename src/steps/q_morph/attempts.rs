@@ -1,8 +1,11 @@
 //! From the surface to clean quads, tried again with smaller sizes where distance or shapes are not good enough.
 //!
 //! Every attempt starts from an earlier one ([`search`](super::search)) and makes only those regions anew whose triangles
-//! changed. Where none of them is good enough, small pieces of the best are meshed anew ([`rework`](super::rework)), and a
-//! few more attempts go on from there, each with such pieces.
+//! changed. What is poor in it is meshed anew in small pieces ([`rework`](super::rework)), which few attempts of most parts
+//! need no more than. For the others all begins again with whole regions only: larger steps, that lead elsewhere. Pieces
+//! are for what is left then.
+
+use rustc_hash::FxHashSet;
 
 use super::check::{Check, Fault, mean_side, smaller};
 use super::lack::lack;
@@ -47,7 +50,7 @@ pub(super) fn morph(
     let longer = Rules { shortest: rules.least_size, ..rules };
     let looser = Rules { curve_tolerance: LOOSER * rules.curve_tolerance, ..longer };
     for rules in [longer, looser] {
-        if best.lack < BROKEN || params.attempts <= 1 {
+        if best.lack < BROKEN || params.attempts <= 1 || ground.curves.is_empty() {
             break;
         }
         let other = work.attempts(rules, &stats)?;
@@ -73,7 +76,7 @@ struct Morpher<'a, 'g> {
 }
 
 impl Morpher<'_, '_> {
-    /// Remeshes, runs the front, and does again what is not good enough.
+    /// Remeshes, runs the front, and does again what is not good enough: first with pieces meshed anew, then without.
     fn attempts(&self, rules: Rules, stats: &QMorphStats) -> Result<Attempt, QMorphError> {
         let (ground, watch, most) = (self.ground, self.watch, self.params.attempts.max(1));
         let mut mesh = ground.workshop().ok_or(QMorphError::NotManifold)?;
@@ -82,14 +85,18 @@ impl Morpher<'_, '_> {
         remesh(&mut mesh, ground, rules, watch)?;
         prepare(&mut mesh, ground, self.check, rules, watch)?;
         let first = self.attempt(mesh, None, rules, stats)?.ok_or(QMorphError::Empty)?;
-        let mut best = self.improve(first, most, rules, stats, false)?;
-        if most > 1 {
-            best.awake.fill(true);
-            self.rework(&mut best, rules)?;
+        if most == 1 || first.is_good() {
+            return Ok(first);
         }
-        if best.lack > 0.0 {
-            best = self.improve(best, most.div_ceil(2), rules, stats, true)?;
+        let few = self.improve(self.reworked(first.clone(), rules)?, (2 * most).div_ceil(3), rules, stats, true)?;
+        if few.is_fair() {
+            return Ok(few);
         }
+        let many = self.improve(first, most, rules, stats, false)?;
+        let many = self.improve(self.reworked(many, rules)?, most.div_ceil(2), rules, stats, true)?;
+        let attempts = few.stats.attempts + many.stats.attempts;
+        let mut best = if few.is_better_than(&many) { few } else { many };
+        best.stats.attempts = attempts;
         Ok(best)
     }
 
@@ -125,11 +132,20 @@ impl Morpher<'_, '_> {
         Ok(best)
     }
 
+    /// An attempt with poor places meshed anew in all regions.
+    fn reworked(&self, mut attempt: Attempt, rules: Rules) -> Result<Attempt, Cancelled> {
+        attempt.awake.fill(true);
+        self.rework(&mut attempt, rules)?;
+        Ok(attempt)
+    }
+
     /// Meshes poor places of an attempt anew, in regions that it made.
     fn rework(&self, attempt: &mut Attempt, rules: Rules) -> Result<(), Cancelled> {
         self.watch.phase("meshing poor places anew", None);
-        let rework = Rework { ground: self.ground, check: self.check, rules, watch: self.watch };
+        let drawn = FxHashSet::default();
+        let mut rework = Rework { ground: self.ground, check: self.check, rules, watch: self.watch, drawn };
         for _ in 0..REWORKS {
+            let before = attempt.clone();
             let reworked = rework.run(&mut attempt.quads, &mut attempt.flaws, &attempt.awake)?;
             if reworked == 0 {
                 break;
@@ -137,6 +153,11 @@ impl Morpher<'_, '_> {
             attempt.stats.reworked += reworked;
             attempt.quads.compact();
             self.settle(attempt, rules)?;
+            // A draw is judged by what is near it; vertices settle everywhere.
+            if before.is_better_than(attempt) {
+                *attempt = before;
+                break;
+            }
         }
         Ok(())
     }
@@ -147,7 +168,7 @@ impl Morpher<'_, '_> {
         settle(quads, self.ground, self.check, rules.tolerance, awake, self.watch)?;
         // In all regions: the face nearest to a place may belong to another region than the place.
         attempt.flaws = self.check.flaws(quads, rules.tolerance, self.watch)?;
-        (attempt.lack, attempt.by_region) = lack(quads, &attempt.flaws.faults, rules.tolerance, awake.len());
+        (attempt.lack, attempt.by_region) = lack(quads, &attempt.flaws, rules.tolerance, awake.len());
         Ok(())
     }
 

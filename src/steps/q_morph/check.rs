@@ -1,5 +1,7 @@
 //! How far quads and surface are apart, certified both ways, and where sizes must get smaller for it.
 
+use std::ops::ControlFlow;
+
 use glam::DVec3;
 use rustc_hash::FxHashSet;
 
@@ -11,6 +13,9 @@ use crate::metric::intersection::{faces_of, self_intersections};
 use crate::technique::ground::Ground;
 use crate::technique::mixed::Mixed;
 use crate::watch::{Cancelled, Watch};
+
+/// How far about a place quads may be that are the nearest to it, as a multiple of the tolerance.
+const REACH: f64 = 4.0;
 
 /// The surface, ready to be measured against.
 pub(super) struct Check {
@@ -34,8 +39,14 @@ pub(super) struct Fault {
     pub(super) distance: f64,
 }
 
+/// Quads ready to be measured against, and their numbers in the mesh.
+struct Quads {
+    target: Target,
+    faces: Vec<u32>,
+}
+
 /// What is wrong with quads beside their shapes.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(super) struct Flaws {
     /// Where they are too far from the surface.
     pub(super) faults: Vec<Fault>,
@@ -61,21 +72,33 @@ impl Check {
     }
 
     /// The flaws of some faces of one region, as they lie beside the others.
+    ///
+    /// Time grows with what is near them; only finding that looks at every face.
     pub(super) fn flaws_near(
         &self,
         mesh: &Mixed,
         tolerance: f64,
         faces: &[u32],
-        ground: &Ground<'_>,
         watch: &Watch,
     ) -> Result<Flaws, Cancelled> {
         let area = Aabb::of(faces.iter().flat_map(|&f| mesh.corners(f)).map(|v| mesh.point(v)));
-        let reaches = |&f: &u32| Aabb::of(mesh.corners(f).iter().map(|&v| mesh.point(v))).overlaps(&area);
-        let near: Vec<u32> = mesh.faces().filter(reaches).collect();
         let inside: FxHashSet<u32> = faces.iter().copied().collect();
-        let mut crossing = self.crossing(mesh, &near, watch)?;
+        let is_region = |region: u32| faces.iter().any(|&f| mesh.region(f) == region);
+        let (mut theirs, mut reach) = (FxHashSet::default(), area);
+        let _ = self.surface.bvh().for_each_in(&area.grown(tolerance), |i, [a, b, c]| {
+            let face = self.surface.face(i);
+            if is_region(self.regions[face.index()]) {
+                theirs.insert(face);
+                reach = [*a, *b, *c].into_iter().fold(reach, Aabb::with);
+            }
+            ControlFlow::Continue(())
+        });
+        let near = faces_in(mesh, &reach.grown(REACH * tolerance));
+        let near = Quads { target: Target::of(&mesh.soup_of(&near)), faces: near };
+        let faults = self.beyond_where(&near, tolerance, &|f| inside.contains(&f), &|f| theirs.contains(&f), watch)?;
+        let mut crossing = self.crossing(mesh, &faces_in(mesh, &area), watch)?;
         crossing.retain(|f| inside.contains(f));
-        Ok(Flaws { faults: self.beyond_near(mesh, tolerance, &inside, &area, ground, watch)?, crossing })
+        Ok(Flaws { faults, crossing })
     }
 
     /// Those of these faces that pass through each other.
@@ -96,48 +119,30 @@ impl Check {
         awake: &[bool],
         watch: &Watch,
     ) -> Result<Vec<Fault>, Cancelled> {
+        let quads = Quads { target: Target::of(&mesh.leave().0), faces: mesh.faces().collect() };
         let ours = |f: u32| awake[mesh.region(f) as usize];
         let theirs = |f: FaceId| awake[self.regions[f.index()] as usize];
-        self.beyond_where(mesh, tolerance, &ours, &theirs, watch)
-    }
-
-    /// The same for some faces of a region, and the surface's faces of that region that reach into their box.
-    fn beyond_near(
-        &self,
-        mesh: &Mixed,
-        tolerance: f64,
-        inside: &FxHashSet<u32>,
-        area: &Aabb,
-        ground: &Ground<'_>,
-        watch: &Watch,
-    ) -> Result<Vec<Fault>, Cancelled> {
-        let area = area.grown(tolerance);
-        let is_region = |region: u32| inside.iter().any(|&f| mesh.region(f) == region);
-        let reaches = |f: FaceId| Aabb::of(ground.surface.corners(f)).overlaps(&area);
-        let theirs = |f: FaceId| reaches(f) && is_region(self.regions[f.index()]);
-        self.beyond_where(mesh, tolerance, &|f| inside.contains(&f), &theirs, watch)
+        self.beyond_where(&quads, tolerance, &ours, &theirs, watch)
     }
 
     fn beyond_where(
         &self,
-        mesh: &Mixed,
+        Quads { target, faces }: &Quads,
         tolerance: f64,
         ours: &(dyn Fn(u32) -> bool + Sync),
         theirs: &(dyn Fn(FaceId) -> bool + Sync),
         watch: &Watch,
     ) -> Result<Vec<Fault>, Cancelled> {
-        let quads = Target::of(&mesh.leave().0);
-        let faces: Vec<u32> = mesh.faces().collect();
         let mut found = Vec::new();
-        let decision = decide_where(&quads, &self.surface, tolerance, &|f| ours(faces[f.index()]), watch)?;
+        let decision = decide_where(target, &self.surface, tolerance, &|f| ours(faces[f.index()]), watch)?;
         for (face, p, distance) in decision.into_iter().flat_map(|d| d.beyond) {
             let at = self.surface.bvh().closest(p).map_or(p, |c| c.nearest.point);
             found.push(Fault { face: faces[face.index()], at, distance });
         }
-        let decision = decide_where(&self.surface, &quads, tolerance, theirs, watch)?;
+        let decision = decide_where(&self.surface, target, tolerance, theirs, watch)?;
         for (_, at, distance) in decision.into_iter().flat_map(|d| d.beyond) {
-            if let Some(nearest) = quads.bvh().closest(at) {
-                found.push(Fault { face: faces[quads.face(nearest.index).index()], at, distance });
+            if let Some(nearest) = target.bvh().closest(at) {
+                found.push(Fault { face: faces[target.face(nearest.index).index()], at, distance });
             }
         }
         Ok(found)
@@ -150,6 +155,12 @@ impl Check {
         let from = upper_bound(&self.surface, &quads, watch)?.unwrap_or(0.0);
         Ok(to.max(from))
     }
+}
+
+/// The faces whose boxes reach into an area.
+fn faces_in(mesh: &Mixed, area: &Aabb) -> Vec<u32> {
+    let box_of = |f: u32| Aabb::of(mesh.corners(f).iter().map(|&v| mesh.point(v)));
+    mesh.faces().filter(|&f| box_of(f).overlaps(area)).collect()
 }
 
 /// A place, how far about it, and the size that faces are to have there.

@@ -2,14 +2,17 @@
 
 use std::f64::consts::FRAC_PI_2;
 
-use super::check::Fault;
+use super::check::{Fault, Flaws};
 use crate::technique::clean_quads::sharpest_sector_of;
 use crate::technique::mixed::Mixed;
 
 /// Shapes above this count as good.
-const FAIR: f64 = 0.5;
+pub(super) const FAIR: f64 = 0.5;
 /// What a poor shape weighs that the curves at its corners excuse.
 const CUSP: f64 = 0.5;
+
+/// What a face lacks that another one passes through.
+pub(super) const CROSSING: f64 = 0.1;
 
 /// What a face lacks: for being broken, from its shape, and that and what the curves at its corners excuse.
 fn lacks(mesh: &Mixed, f: u32) -> (f64, f64, f64) {
@@ -21,7 +24,7 @@ fn lacks(mesh: &Mixed, f: u32) -> (f64, f64, f64) {
 }
 
 /// How much an attempt lacks, in all and by region: 0 where it holds to the tolerance with sound shapes.
-pub(super) fn lack(mesh: &Mixed, faults: &[Fault], tolerance: f64, regions: usize) -> (f64, Vec<f64>) {
+pub(super) fn lack(mesh: &Mixed, flaws: &Flaws, tolerance: f64, regions: usize) -> (f64, Vec<f64>) {
     let mut by_region = vec![0.0; regions];
     let mut poorest = vec![0.0_f64; regions];
     for f in mesh.faces() {
@@ -31,7 +34,10 @@ pub(super) fn lack(mesh: &Mixed, faults: &[Fault], tolerance: f64, regions: usiz
         poorest[region] = poorest[region].max(poverty);
     }
     let mut farthest = vec![0.0_f64; regions];
-    for fault in faults {
+    for &f in &flaws.crossing {
+        by_region[mesh.region(f) as usize] += CROSSING;
+    }
+    for fault in &flaws.faults {
         let far = &mut farthest[mesh.region(fault.face) as usize];
         *far = far.max(excess(fault, tolerance));
     }
@@ -39,7 +45,7 @@ pub(super) fn lack(mesh: &Mixed, faults: &[Fault], tolerance: f64, regions: usiz
     for ((lack, far), poorest) in by_region.iter_mut().zip(farthest).zip(poorest) {
         *lack += 4.0 * far + poorest;
     }
-    (lack_of(mesh, mesh.faces(), faults, tolerance), by_region)
+    (lack_of(mesh, mesh.faces(), flaws, tolerance), by_region)
 }
 
 /// By how much a fault exceeds the tolerance, as a part of it.
@@ -47,8 +53,8 @@ pub(super) fn excess(fault: &Fault, tolerance: f64) -> f64 {
     fault.distance / tolerance - 1.0
 }
 
-/// How much some faces lack, with the faults there.
-pub(super) fn lack_of(mesh: &Mixed, faces: impl Iterator<Item = u32>, faults: &[Fault], tolerance: f64) -> f64 {
+/// How much some faces lack, with the flaws there.
+pub(super) fn lack_of(mesh: &Mixed, faces: impl Iterator<Item = u32>, flaws: &Flaws, tolerance: f64) -> f64 {
     let (mut broken, mut poorest, mut poor) = (0.0, 0.0_f64, 0.0);
     for f in faces {
         let (wrong, short, poverty) = lacks(mesh, f);
@@ -56,9 +62,9 @@ pub(super) fn lack_of(mesh: &Mixed, faces: impl Iterator<Item = u32>, faults: &[
         poor += short;
         poorest = poorest.max(poverty);
     }
-    let worst = faults.iter().map(|fault| excess(fault, tolerance)).fold(0.0, f64::max);
+    let worst = flaws.faults.iter().map(|fault| excess(fault, tolerance)).fold(0.0, f64::max);
     // Many poor faces are no broken one.
-    broken + 4.0 * worst + poorest + (0.2 * poor).min(2.0)
+    broken + CROSSING * flaws.crossing.len() as f64 + 4.0 * worst + poorest + (0.2 * poor).min(2.0)
 }
 
 /// What a face lacks from the shape that it could have, as a part of that: good, or as good as the curves that meet at its

@@ -93,8 +93,9 @@ pub struct QMorphParams {
     /// Whether there must be no triangle. Default true; false leaves one in each region with an odd number of border
     /// edges, and no curve gets an edge more for it.
     pub all_quad: bool,
-    /// How often the front may run where distance or shapes are not good enough: so often over whole regions, and half as
-    /// often again with small pieces about poor places meshed anew. Default 12; 1 takes what the first run gives.
+    /// How often the front may run where distance or shapes are not good enough: two thirds of it with small pieces about
+    /// poor places meshed anew, and where that does not do, so often over whole regions and half as often with pieces
+    /// again. Default 12; 1 takes what the first run gives.
     #[schemars(range(min = 1, max = 1000))]
     pub attempts: usize,
     /// The step fails before it begins if the result would have more faces. Default 20 million.
@@ -297,7 +298,7 @@ pub struct Step;
 
 impl StepContract for Step {
     const NAME: &'static str = "q-morph";
-    const REVISION: u32 = 13;
+    const REVISION: u32 = 14;
     const INPUTS: &'static [InputDef] = &[InputDef {
         name: "from",
         accepts: &[Port::Surface],

@@ -3,6 +3,7 @@
 use rustc_hash::{FxHashMap, FxHashSet};
 use smallvec::smallvec;
 
+use super::reuse::sign;
 use crate::mesh::{Facet, Soup, VertexId};
 use crate::technique::clean_quads::{clean, finish};
 use crate::technique::front::advance;
@@ -11,6 +12,12 @@ use crate::technique::isotropic::{Rules, polish, refill};
 use crate::technique::join::{join_along_paths, join_neighbours};
 use crate::technique::mixed::{Corners, Mixed, NONE, Place, triangle_quality};
 use crate::watch::{Cancelled, Watch};
+
+/// A patch with more than so many times the faces has an unlucky rim, and comes out poor after long work.
+const MORE: usize = 2;
+/// Shapes that the last optimisation is for, and how many of them it can mend.
+const POOR: f64 = 0.35;
+const MENDABLE: usize = 8;
 
 /// The faces of a disk inside one region.
 pub(super) struct Patch {
@@ -22,29 +29,35 @@ pub(super) struct Patch {
 }
 
 impl Patch {
-    /// The faces round one, so many rings of neighbours at corners, all in its region. `None` where they are no disk.
+    /// The faces round one, so many rings of neighbours at corners, all in its region: as many of them as make a disk.
+    /// `None` where that is no more than the one.
     pub(super) fn around(mesh: &Mixed, face: u32, rings: usize) -> Option<Self> {
         let region = mesh.region(face);
-        let mut inside: FxHashSet<u32> = FxHashSet::from_iter([face]);
-        let mut faces = vec![face];
+        let mut disk = Disk::of(mesh, face);
         let mut last = 0..1;
         for _ in 0..rings {
-            for i in last.clone() {
-                for v in mesh.corners(faces[i]) {
+            let mut ring: Vec<u32> = Vec::new();
+            for &f in &disk.faces[last.clone()] {
+                for v in mesh.corners(f) {
                     // Only through vertices inside: beyond a curve lie other parts of the region.
                     if mesh.place(v).is_free() {
-                        faces.extend(mesh.faces_at(v).filter(|&f| mesh.region(f) == region && inside.insert(f)));
+                        ring.extend(mesh.faces_at(v).filter(|&f| mesh.region(f) == region));
                     }
                 }
             }
-            last = last.end..faces.len();
+            last = last.end..disk.grow(mesh, ring);
         }
-        let rim = rim(mesh, &faces, &inside)?;
-        Some(Self { faces, region, rim })
+        let rim = disk.rim(mesh);
+        (disk.faces.len() > 1).then_some(Self { faces: disk.faces, region, rim })
+    }
+
+    /// A number for its faces as they lie, that is another one when they change.
+    pub(super) fn sign(&self, mesh: &Mixed) -> u64 {
+        self.faces.iter().fold(0, |sum, &f| sum.wrapping_add(sign(mesh, f)))
     }
 
     /// Quads for the patch, with sizes inside times `scale`: a mesh of its own that begins with the vertices of the rim.
-    /// `None` where there is a triangle left.
+    /// `None` where there is a triangle left, and as soon as it comes out too bad to become good.
     pub(super) fn remade(
         &self,
         mesh: &Mixed,
@@ -61,10 +74,13 @@ impl Patch {
         advance(&mut patch, ground, watch)?;
         join_neighbours(&mut patch);
         join_along_paths(&mut patch, ground);
-        if patch.census().0 > 0 {
+        if patch.census().0 > 0 || patch.faces().count() > MORE * self.faces.len() + 8 {
             return Ok(None);
         }
         clean(&mut patch, ground, rules.curve_tolerance, &awake, watch)?;
+        if patch.faces().filter(|&f| patch.quality(f) < POOR).count() > MENDABLE {
+            return Ok(None);
+        }
         finish(&mut patch, ground, rules.curve_tolerance, &awake, watch)?;
         Ok(Some(patch))
     }
@@ -142,30 +158,62 @@ fn is_rim(mesh: &Mixed, h: u32) -> bool {
     mesh.face(h) == NONE || mesh.face(h ^ 1) == NONE
 }
 
-/// The rim of faces, each vertex once; `None` where they are no disk, or a curve runs through them.
-fn rim(mesh: &Mixed, faces: &[u32], inside: &FxHashSet<u32>) -> Option<Vec<u32>> {
-    let (mut vertices, mut rim) = (FxHashSet::default(), Vec::new());
-    let mut inner = 0;
-    for &f in faces {
-        for h in mesh.sides(f) {
-            vertices.insert(mesh.origin(h));
-            if !inside.contains(&mesh.face(h ^ 1)) {
-                rim.push(mesh.origin(h));
-            } else if mesh.arc(h) != NONE {
-                return None;
-            } else {
-                inner += 1;
+/// Faces that are a disk whose rim touches itself nowhere.
+struct Disk {
+    faces: Vec<u32>,
+    inside: FxHashSet<u32>,
+    vertices: FxHashSet<u32>,
+}
+
+impl Disk {
+    fn of(mesh: &Mixed, face: u32) -> Self {
+        let vertices = mesh.corners(face).into_iter().collect();
+        Self { faces: vec![face], inside: FxHashSet::from_iter([face]), vertices }
+    }
+
+    /// Adds those of the faces that leave it a disk, in their order, until none does. Returns how many it has then.
+    fn grow(&mut self, mesh: &Mixed, mut ring: Vec<u32>) -> usize {
+        loop {
+            let before = self.faces.len();
+            ring.retain(|f| !self.inside.contains(f));
+            for &f in &ring {
+                if !self.inside.contains(&f) && self.may_add(mesh, f) {
+                    self.faces.push(f);
+                    self.inside.insert(f);
+                    self.vertices.extend(mesh.corners(f));
+                }
+            }
+            if self.faces.len() == before {
+                return before;
             }
         }
     }
-    let edges = rim.len() + inner / 2;
-    let is_disk = vertices.len() + faces.len() == edges + 1;
-    let length = rim.len();
-    rim.sort_unstable();
-    rim.dedup();
-    let bound = vertices.iter().filter(|&&v| !mesh.place(v).is_free());
-    let keeps_bound = bound.into_iter().all(|v| rim.binary_search(v).is_ok());
-    (is_disk && rim.len() == length && inner > 0 && keeps_bound).then_some(rim)
+
+    /// Whether a face meets the disk in one chain of sides, which has no vertex within that must stay on the rim.
+    fn may_add(&self, mesh: &Mixed, f: u32) -> bool {
+        let sides: Vec<u32> = mesh.sides(f).collect();
+        let joins = |h: u32| self.inside.contains(&mesh.face(h ^ 1));
+        let starts = |&h: &u32| joins(h) && !joins(mesh.prev(h));
+        let is_one_chain = sides.iter().filter(|h| starts(h)).count() == 1;
+        is_one_chain
+            && sides.iter().all(|&h| {
+                let v = mesh.origin(h);
+                match (joins(mesh.prev(h)), joins(h)) {
+                    (true, true) => mesh.place(v).is_free() && mesh.arc(h) == NONE,
+                    (false, false) => !self.vertices.contains(&v),
+                    (_, joins) => !joins || mesh.arc(h) == NONE,
+                }
+            })
+    }
+
+    /// The vertices of its rim, in order.
+    fn rim(&self, mesh: &Mixed) -> Vec<u32> {
+        let is_rim = |h: &u32| !self.inside.contains(&mesh.face(h ^ 1));
+        let sides = self.faces.iter().flat_map(|&f| mesh.sides(f));
+        let mut rim: Vec<u32> = sides.filter(is_rim).map(|h| mesh.origin(h)).collect();
+        rim.sort_unstable();
+        rim
+    }
 }
 
 /// A face as triangles, a quad cut where the poorer one is better.

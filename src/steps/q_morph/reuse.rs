@@ -7,13 +7,14 @@ use rustc_hash::{FxHashMap, FxHasher};
 
 use super::QMorphStats;
 use super::check::Flaws;
+use super::lack::{FAIR, shortfall};
 use crate::mesh::{Facet, Soup, VertexId, edge_key};
 use crate::technique::ground::Ground;
 use crate::technique::isotropic::chains;
 use crate::technique::mixed::{Mixed, NONE, Place};
 
 /// What an attempt began with and what it came to.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(super) struct Attempt {
     /// The triangles before regions were made even.
     pub(super) triangles: Mixed,
@@ -34,6 +35,17 @@ pub(super) struct Attempt {
 }
 
 impl Attempt {
+    /// Whether there is nothing that another attempt could be asked for.
+    pub(super) fn is_good(&self) -> bool {
+        let Flaws { faults, crossing } = &self.flaws;
+        faults.is_empty() && crossing.is_empty() && self.quads.faces().all(|f| shortfall(&self.quads, f) == 0.0)
+    }
+
+    /// Whether nothing is left but poor shapes, which lack less together than one flat face.
+    pub(super) fn is_fair(&self) -> bool {
+        self.flaws.faults.is_empty() && self.flaws.crossing.is_empty() && self.lack < FAIR
+    }
+
     /// Whether this one lacks less than another: as a whole, or else in the sum of its regions.
     pub(super) fn is_better_than(&self, other: &Self) -> bool {
         let sum = |attempt: &Self| attempt.by_region.iter().sum::<f64>();
@@ -43,22 +55,27 @@ impl Attempt {
 
 /// A number for the triangles of each region that is another one when they change.
 pub(super) fn signs(mesh: &Mixed, regions: usize) -> Vec<u64> {
+    let mut signs = vec![0_u64; regions];
+    for f in mesh.faces() {
+        let region = &mut signs[mesh.region(f) as usize];
+        // A sum, because there is no first face.
+        *region = region.wrapping_add(sign(mesh, f));
+    }
+    signs
+}
+
+/// A number for where a face's corners are.
+pub(super) fn sign(mesh: &Mixed, f: u32) -> u64 {
     let hash = |p: DVec3| {
         let mut hasher = FxHasher::default();
         p.to_array().map(f64::to_bits).hash(&mut hasher);
         hasher.finish()
     };
-    let points: Vec<u64> = (0..mesh.vertex_slots()).map(|v| hash(mesh.point(v))).collect();
-    let mut signs = vec![0_u64; regions];
-    for f in mesh.faces() {
-        // A sum over corners and faces, because neither has a first one.
-        let corners = mesh.corners(f).iter().fold(0_u64, |sum, &v| sum.wrapping_add(points[v as usize]));
-        let mut hasher = FxHasher::default();
-        corners.hash(&mut hasher);
-        let sign = &mut signs[mesh.region(f) as usize];
-        *sign = sign.wrapping_add(hasher.finish());
-    }
-    signs
+    // A sum, because there is no first corner.
+    let corners = mesh.corners(f).iter().fold(0_u64, |sum, &v| sum.wrapping_add(hash(mesh.point(v))));
+    let mut hasher = FxHasher::default();
+    corners.hash(&mut hasher);
+    hasher.finish()
 }
 
 /// The triangles of `mesh` in regions that changed, and the earlier quads in the others; and whether each region changed.

@@ -3,8 +3,10 @@
 //! A region is a lottery: one more row, and the front closes elsewhere. In a piece of few rings about a poor place the
 //! draw is cheap, and what is sound everywhere else stays. The first draw that makes the place better is kept.
 
+use rustc_hash::FxHashSet;
+
 use super::check::{Check, Fault, Flaws};
-use super::lack::{excess, lack_of, shortfall};
+use super::lack::{CROSSING, excess, lack_of, shortfall};
 use super::patch::Patch;
 use crate::technique::ground::Ground;
 use crate::technique::isotropic::Rules;
@@ -19,8 +21,6 @@ const FOR_SHAPE: [(usize, f64); 3] = [(2, 1.0), (3, 1.0), (4, 0.7)];
 const FOR_DISTANCE: [(usize, f64); 2] = [(2, 0.7), (3, 0.7)];
 /// Most places in one go.
 const PLACES: usize = 40;
-/// What a face weighs that another one passes through.
-const CROSSING: f64 = 0.1;
 /// A draw must take away this part of what the place lacks.
 const GAIN: f64 = 0.05;
 
@@ -30,16 +30,27 @@ pub(super) struct Rework<'a, 'g> {
     pub(super) check: &'a Check,
     pub(super) rules: Rules,
     pub(super) watch: &'a Watch,
+    /// Patches that were drawn, by their sign and the part of the sizes: again, they would come out the same.
+    pub(super) drawn: FxHashSet<(u64, u64)>,
 }
 
 impl Rework<'_, '_> {
     /// Goes through the worst places in regions that are `awake`. Returns how many got better.
-    pub(super) fn run(&self, mesh: &mut Mixed, flaws: &mut Flaws, awake: &[bool]) -> Result<usize, Cancelled> {
-        let mut better = 0;
-        for (face, is_far) in self.places(mesh, flaws, awake).into_iter().take(PLACES) {
+    pub(super) fn run(&mut self, mesh: &mut Mixed, flaws: &mut Flaws, awake: &[bool]) -> Result<usize, Cancelled> {
+        let (mut better, mut tried) = (0, 0);
+        let mut spent: FxHashSet<(u32, bool)> = FxHashSet::default();
+        for (face, is_far) in self.places(mesh, flaws, awake) {
             self.watch.check()?;
-            if mesh.is_face(face) && self.mend(mesh, face, is_far, flaws)? {
+            if tried == PLACES || !mesh.is_face(face) || spent.contains(&(face, is_far)) {
+                continue;
+            }
+            tried += 1;
+            if self.mend(mesh, face, is_far, flaws)? {
                 better += 1;
+            } else {
+                // The patches of its neighbours are much the same.
+                let near = mesh.corners(face).into_iter().flat_map(|v| mesh.faces_at(v).collect::<Vec<_>>());
+                spent.extend(near.map(|f| (f, is_far)));
             }
         }
         Ok(better)
@@ -63,33 +74,30 @@ impl Rework<'_, '_> {
         places.into_iter().map(|(_, face, is_far)| (face, is_far)).collect()
     }
 
-    /// How much some faces lack with their flaws.
-    fn lack(&self, mesh: &Mixed, faces: &[u32], flaws: &Flaws) -> f64 {
-        let crossing = CROSSING * flaws.crossing.len() as f64;
-        crossing + lack_of(mesh, faces.iter().copied(), &flaws.faults, self.rules.tolerance)
-    }
-
     /// Draws anew about a face until one draw is better. Whether one was.
-    fn mend(&self, mesh: &mut Mixed, face: u32, is_far: bool, flaws: &mut Flaws) -> Result<bool, Cancelled> {
+    fn mend(&mut self, mesh: &mut Mixed, face: u32, is_far: bool, flaws: &mut Flaws) -> Result<bool, Cancelled> {
         let tolerance = self.rules.tolerance;
         let draws: &[(usize, f64)] = if is_far { &FOR_DISTANCE } else { &FOR_SHAPE };
         for &(rings, scale) in draws {
             let Some(patch) = Patch::around(mesh, face, rings) else { continue };
             let before = within(flaws, &patch);
-            let lacked = self.lack(mesh, &patch.faces, &before);
+            let lacked = lack_of(mesh, patch.faces.iter().copied(), &before, tolerance);
             if lacked == 0.0 {
                 return Ok(false);
             }
+            if !self.drawn.insert((patch.sign(mesh), scale.to_bits())) {
+                continue;
+            }
             let enough = (1.0 - GAIN) * lacked;
             let Some(remade) = patch.remade(mesh, self.ground, self.rules, scale, self.watch)? else { continue };
-            if lack_of(&remade, remade.faces(), &[], tolerance) >= enough {
+            if lack_of(&remade, remade.faces(), &Flaws::default(), tolerance) >= enough {
                 continue;
             }
             mesh.begin();
             if let Some(made) = patch.put_back(mesh, &remade) {
-                let after = self.check.flaws_near(mesh, tolerance, &made, self.ground, self.watch)?;
+                let after = self.check.flaws_near(mesh, tolerance, &made, self.watch)?;
                 let crosses = after.crossing.len() > before.crossing.len();
-                if !crosses && self.lack(mesh, &made, &after) < enough {
+                if !crosses && lack_of(mesh, made.iter().copied(), &after, tolerance) < enough {
                     mesh.commit();
                     flaws.faults.retain(|fault| !patch.faces.contains(&fault.face));
                     flaws.faults.extend(after.faults);
@@ -164,7 +172,8 @@ mod tests {
         let watch = Watch::silent();
         let check = Check::new(ground, &watch).unwrap();
         let mut flaws = check.flaws(mesh, rules().tolerance, &watch).unwrap();
-        Rework { ground, check: &check, rules: rules(), watch: &watch }.run(mesh, &mut flaws, &[true]).unwrap()
+        let drawn = FxHashSet::default();
+        Rework { ground, check: &check, rules: rules(), watch: &watch, drawn }.run(mesh, &mut flaws, &[true]).unwrap()
     }
 
     #[test]
@@ -193,6 +202,31 @@ mod tests {
     }
 
     #[test]
+    fn the_rim_of_a_patch_is_one_walk_that_passes_vertices_that_must_stay() {
+        let surface = square();
+        let ground = Ground::new(&surface);
+        let mut mesh = quads(&ground, &[]);
+        let kept = [id(5, 5), id(5, 7), id(6, 6), id(2, 4)].map(VertexId::raw);
+        for v in kept {
+            mesh.set_place(v, Place::Node);
+        }
+        for (face, rings) in (0..N * N).flat_map(|f| (1..5).map(move |rings| (f, rings))) {
+            let Some(patch) = Patch::around(&mesh, face, rings) else { continue };
+            let is_rim = |h: &u32| !patch.faces.contains(&mesh.face(h ^ 1));
+            let sides = patch.faces.iter().flat_map(|&f| mesh.sides(f));
+            let rim: Vec<(u32, u32)> = sides.filter(is_rim).map(|h| (mesh.origin(h), mesh.target(h))).collect();
+            let next = |v: u32| rim.iter().find(|side| side.0 == v).unwrap().1;
+            let (mut at, mut steps) = (rim[0].1, 1);
+            while at != rim[0].0 {
+                (at, steps) = (next(at), steps + 1);
+            }
+            assert_eq!(steps, rim.len(), "{face} {rings}");
+            let touches = |v: u32| patch.faces.iter().any(|&f| mesh.corners(f).contains(&v));
+            assert!(kept.iter().all(|&v| !touches(v) || rim.iter().any(|side| side.0 == v)), "{face} {rings}");
+        }
+    }
+
+    #[test]
     fn sound_quads_are_left_alone() {
         let surface = square();
         let ground = Ground::new(&surface);
@@ -207,9 +241,11 @@ mod tests {
         let ground = Ground::new(&surface);
         let mut mesh = quads(&ground, &[]);
         let middle = 5 * N + 5;
-        assert_eq!(Patch::around(&mesh, middle, 0).map(|patch| patch.faces), None, "one face has nothing inside");
+        assert!(Patch::around(&mesh, middle, 0).is_none(), "one face has nothing inside");
         assert_eq!(Patch::around(&mesh, middle, 1).unwrap().faces.len(), 9);
         mesh.set_place(id(6, 6).raw(), Place::Node);
-        assert!(Patch::around(&mesh, middle, 2).is_none(), "a kept vertex would be lost");
+        let beside = Patch::around(&mesh, middle, 1).unwrap().faces;
+        assert_eq!(beside.len(), 8, "it goes round a vertex that must stay");
+        assert!(!beside.contains(&(6 * N + 6)));
     }
 }

@@ -129,7 +129,8 @@ impl Asked {
             places.push((at, reach, again(fault.face) * size));
             asked[mesh.region(fault.face) as usize] = true;
         }
-        for f in mesh.faces().filter(|&f| wants(f) && shortfall(mesh, f) > 0.0) {
+        let poor = mesh.faces().filter(|&f| shortfall(mesh, f) > 0.0);
+        for f in poor.chain(from.flaws.crossing.iter().copied()).filter(|&f| wants(f)) {
             // A sliver's sides say nothing about what would do in its place.
             let side = mean_side(mesh, f).max(LEAST_ROOM * mean_size(mesh, f));
             places.push((mesh.centre(f), 1.2 * side, again(f) * ROOM * side));
@@ -231,6 +232,20 @@ mod tests {
         assert!(second[1].2 < first[1].2, "smaller where it failed");
         learn(&mut search, Some([0.1, 0.2]));
         assert_eq!(search.into_best().by_region, [0.1, 0.2]);
+    }
+
+    #[test]
+    fn faces_that_others_pass_through_are_to_be_smaller() {
+        let square = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(|[x, y]| glam::dvec3(x, y, 0.0));
+        let quads = crate::technique::mixed::Mixed::of_faces(&square, &[&[0, 1, 2, 3]]).unwrap();
+        let mut crossed = Attempt { quads, lack: 0.1, by_region: vec![0.1], ..Attempt::default() };
+        let rules =
+            Rules { tolerance: 0.1, curve_tolerance: 0.1, shortest: 0.0, least_size: 0.1, floor: 1e-3, gradation: 0.3 };
+        assert!(crossed.is_good());
+        crossed.flaws.crossing.push(0);
+        assert!(!crossed.is_good() && !crossed.is_fair());
+        let places = Search::new(crossed).places(rules);
+        assert_eq!(places, [(glam::dvec3(0.5, 0.5, 0.0), 1.2, ROOM)]);
     }
 
     #[test]

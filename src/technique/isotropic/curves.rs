@@ -122,7 +122,7 @@ impl Remesher<'_, '_> {
         let curve = &self.ground.curves[arc as usize];
         let inside: Vec<(f64, u32)> = chain[1..chain.len() - 1].to_vec();
         let mut taken = vec![false; inside.len()];
-        let mut missing = Vec::new();
+        let (mut missing, mut stuck) = (Vec::new(), Vec::new());
         for k in 1..places.len().saturating_sub(1) {
             let reach = NEAR * (places[k] - places[k - 1]).min(places[k + 1] - places[k]);
             let near = inside.partition_point(|&(at, _)| at < places[k]);
@@ -138,6 +138,8 @@ impl Remesher<'_, '_> {
                     let place = Place::Arc { arc, at: places[k] };
                     if self.try_move(inside[i].1, curve.at(places[k]), glam::DVec3::ZERO, place) {
                         chain[i + 1].0 = places[k];
+                    } else {
+                        stuck.push((places[k], size, inside[i].1));
                     }
                     self.note_size(inside[i].1, size);
                 }
@@ -149,6 +151,13 @@ impl Remesher<'_, '_> {
         }
         for (at, size) in missing {
             self.insert(arc, chain, at, size);
+        }
+        for (at, size, v) in stuck {
+            let next = chain.partition_point(|&(s, _)| s < at).clamp(1, chain.len() - 1);
+            if curve.sag(chain[next - 1].0, chain[next].0) > self.rules.curve_tolerance {
+                self.insert(arc, chain, at, size);
+                self.surplus[v as usize] = true;
+            }
         }
     }
 
