@@ -62,7 +62,7 @@ pub struct FeaturesParams {
     /// positive where convex; `max` is the larger magnitude. Averaged over balls of 2.5 mean edges. Default false.
     pub curvature: bool,
     /// Of curves that run alongside each other within this distance only the sharpest is marked: closer pairs would
-    /// force slivers between them. Default 0.1 % of the diagonal; 0 marks all.
+    /// force slivers between them. Both stay about thin walls and slots. Default 0.1 % of the diagonal; 0 marks all.
     pub min_gap: Length,
 }
 
@@ -230,7 +230,7 @@ pub struct Step;
 
 impl StepContract for Step {
     const NAME: &'static str = "features";
-    const REVISION: u32 = 3;
+    const REVISION: u32 = 4;
     const INPUTS: &'static [InputDef] =
         &[InputDef { name: "from", accepts: &[Port::Surface], required: true, doc: "the surface to mark" }];
     const OUTPUTS: &'static [OutputDef] = &[OutputDef { name: "main", port: OutPort::Is(Port::Surface) }];

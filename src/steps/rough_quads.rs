@@ -216,13 +216,15 @@ fn finish(surface: &Surface, made: Attempt) -> (Quads, RoughQuadsStats) {
 /// In which ways belts are cut: their order, how near connectors join a node, and how many times as far apart nodes lie.
 /// Shorter intervals come last: where limbs or holes are hardly wider than one element, there is no regular layout of
 /// elements of the size asked for.
-const WAYS: [(Order, f64, f64); 6] = [
+const WAYS: [(Order, f64, f64); 8] = [
     (Order::FromOutside, SNAP, 1.0),
     (Order::FromBorders, 0.5, 1.0),
     (Order::FromOutside, SNAP, 0.9),
     (Order::FromOutside, SNAP, 0.8),
     (Order::FromBorders, 0.5, 0.7),
     (Order::FromOutside, SNAP, 0.6),
+    (Order::FromBorders, 0.5, 0.6),
+    (Order::FromBorders, 0.5, 0.5),
 ];
 
 /// The best of several ways to cut the belts; the first that is good enough ends the search.
@@ -335,7 +337,7 @@ pub struct Step;
 
 impl StepContract for Step {
     const NAME: &'static str = "rough-quads";
-    const REVISION: u32 = 5;
+    const REVISION: u32 = 6;
     const INPUTS: &'static [InputDef] = &[InputDef {
         name: "from",
         accepts: &[Port::Surface],

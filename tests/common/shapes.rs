@@ -131,7 +131,11 @@ pub(crate) fn cylinder(n: usize, layers: usize) -> Soup {
 
 /// A disc of radius 2 and height 1 with a hole of radius 0.3, of `n` facets each.
 pub(crate) fn washer(n: usize) -> Soup {
-    let profile = [(2.0, -0.5), (2.0, 0.5), (0.3, 0.5), (0.3, -0.5)];
+    turned(n, [(2.0, -0.5), (2.0, 0.5), (0.3, 0.5), (0.3, -0.5)])
+}
+
+/// A profile of radii and heights, turned round in `n` facets.
+pub(crate) fn turned(n: usize, profile: [(f64, f64); 4]) -> Soup {
     sheet(n, 4, [true; 2], |u, v| {
         let (radius, z) = profile[(4.0 * v) as usize % 4];
         dvec3(radius * libm::cos(TAU * u), radius * libm::sin(TAU * u), z)

@@ -135,9 +135,12 @@ fn golden_files() {
     golden("q-morph", "curved", "size = \"9%\", size-curvature = 24", &surface(plain(&shapes::torus(16, 8))));
 }
 
+fn stl(part: &Path) -> Soup {
+    read(Format::Stl, &std::fs::read(part).unwrap(), &Watch::silent()).unwrap().0
+}
+
 /// The quads of a part by the steps of `quads-closed.toml`, and the statistics of the last one.
-fn chained(part: &Path, parameters: &str) -> (Arc<Quads>, Value) {
-    let (part, _) = read(Format::Stl, &std::fs::read(part).unwrap(), &Watch::silent()).unwrap();
+fn chained(part: Soup, parameters: &str) -> (Arc<Quads>, Value) {
     let mut artifact = Artifact::Soup(Arc::new(part));
     let chain = [
         ("repair", "fill-holes = \"all\""),
@@ -159,7 +162,7 @@ fn walls_of_bores_are_meshed_however_coarse() {
     // Needles from rim to rim have no vertex inside that knows where the wall looks. At this size the triangles that quads
     // are made of came to span the bores, and a dozen quads were inverted after minutes.
     let part = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/examples/meshes/simple_part.stl"));
-    let (quads, _) = chained(part, "size = 1.249, tolerance = \"1%\", curve-tolerance = \"0.3%\"");
+    let (quads, _) = chained(stl(part), "size = 1.249, tolerance = \"1%\", curve-tolerance = \"0.3%\"");
     let least = quad_shapes(&quads.mesh).column(|q| q.scaled_jacobian).iter().copied().fold(1.0, f64::min);
     assert!(least > 0.1, "the worst quad is {least}");
     assert!(quads.mesh.faces.len() < 6000, "{} quads, three thousand were asked for", quads.mesh.faces.len());
@@ -169,11 +172,31 @@ fn walls_of_bores_are_meshed_however_coarse() {
 fn a_part_comes_within_the_tolerance_with_sound_shapes() {
     // Attempts that mend one region make those beside it worse: only what is mended on from there holds everywhere.
     let Some(part) = corpus("cad/phone_panel.stl") else { return };
-    let (quads, stats) = chained(&part, "size = \"3%\", tolerance = \"0.3%\"");
+    let (quads, stats) = chained(stl(&part), "size = \"3%\", tolerance = \"0.3%\"");
     let diagonal = Aabb::of(quads.mesh.points.iter().copied()).diagonal();
     let number = |name: &str| stats[name].as_f64().unwrap();
     assert!(number("distance") <= 0.003 * diagonal, "{} from the surface", number("distance"));
     assert!(number("curve-distance") <= 0.0011 * diagonal, "{} from the curves", number("curve-distance"));
     assert!(number("min-scaled-jacobian") >= 0.5, "the worst quad is {}", number("min-scaled-jacobian"));
     assert_eq!(stats["triangles"], 0);
+}
+
+#[test]
+fn thin_walls_have_both_their_edges() {
+    // A wall as thick as a third of a percent of the part, which the tolerance would let pass for nothing: with one edge
+    // round its rim, the quads inside and outside passed through each other.
+    let ring = shapes::turned(64, [(1.0, 0.0), (1.0, 0.5), (0.99, 0.5), (0.99, 0.0)]);
+    let (quads, stats) = chained(ring, "size = \"3%\", tolerance = \"0.3%\"");
+    assert!(stats["min-scaled-jacobian"].as_f64().unwrap() > 0.5, "{stats}");
+    let volume: f64 = quads
+        .mesh
+        .faces
+        .iter()
+        .map(|face| {
+            let [a, b, c, d] = [0, 1, 2, 3].map(|k| quads.mesh.points[face.corners()[k]]);
+            a.dot((b - a).cross(c - a) + (c - a).cross(d - a)) / 6.0
+        })
+        .sum();
+    let wall = 0.5 * 0.5 * 64.0 * libm::sin(std::f64::consts::TAU / 64.0) * (1.0 - 0.99 * 0.99);
+    assert!((volume / wall - 1.0).abs() < 0.05, "a volume of {volume}, not {wall}");
 }

@@ -45,7 +45,8 @@ pub(super) fn morph(
     let stats = QMorphStats { regions, left_out: ground.left_out, attempts: 1, ..QMorphStats::default() };
     let check = Check::new(ground, watch)?;
     let work = Morpher { ground, params, check: &check, scale, watch };
-    let mut best = work.attempts(rules, &stats)?;
+    let mut begun = Vec::new();
+    let Some(mut best) = work.attempts(rules, &stats, &mut begun)? else { return Err(QMorphError::Empty) };
     // Many pieces on a curve that is rough may be what broke it: none shorter than the least size, then a looser curve.
     let longer = Rules { shortest: rules.least_size, ..rules };
     let looser = Rules { curve_tolerance: LOOSER * rules.curve_tolerance, ..longer };
@@ -53,7 +54,7 @@ pub(super) fn morph(
         if best.lack < BROKEN || params.attempts <= 1 || ground.curves.is_empty() {
             break;
         }
-        let other = work.attempts(rules, &stats)?;
+        let Some(other) = work.attempts(rules, &stats, &mut begun)? else { continue };
         let attempts = best.stats.attempts + other.stats.attempts;
         if other.lack < best.lack {
             best = other;
@@ -77,27 +78,41 @@ struct Morpher<'a, 'g> {
 
 impl Morpher<'_, '_> {
     /// Remeshes, runs the front, and does again what is not good enough: first with pieces meshed anew, then without.
-    fn attempts(&self, rules: Rules, stats: &QMorphStats) -> Result<Attempt, QMorphError> {
+    /// `None` where other rules gave the same triangles, whose signs are in `begun`.
+    fn attempts(
+        &self,
+        rules: Rules,
+        stats: &QMorphStats,
+        begun: &mut Vec<Vec<u64>>,
+    ) -> Result<Option<Attempt>, QMorphError> {
         let (ground, watch, most) = (self.ground, self.watch, self.params.attempts.max(1));
         let mut mesh = ground.workshop().ok_or(QMorphError::NotManifold)?;
         sizes::set(&mut mesh, ground.surface, self.params, self.scale).map_err(QMorphError::Size)?;
         watch.phase("remeshing between the curves", None);
         remesh(&mut mesh, ground, rules, watch)?;
         prepare(&mut mesh, ground, self.check, rules, watch)?;
+        let signs = signs(&mesh, ground.region_count());
+        if begun.contains(&signs) {
+            return Ok(None);
+        }
+        begun.push(signs);
         let first = self.attempt(mesh, None, rules, stats)?.ok_or(QMorphError::Empty)?;
         if most == 1 || first.is_good() {
-            return Ok(first);
+            return Ok(Some(first));
         }
         let few = self.improve(self.reworked(first.clone(), rules)?, (2 * most).div_ceil(3), rules, stats, true)?;
         if few.is_fair() {
-            return Ok(few);
+            return Ok(Some(few));
         }
-        let many = self.improve(first, most, rules, stats, false)?;
-        let many = self.improve(self.reworked(many, rules)?, most.div_ceil(2), rules, stats, true)?;
+        let mut many = self.improve(first.clone(), most, rules, stats, false)?;
+        // From the first one, all would go as before.
+        if many.is_better_than(&first) {
+            many = self.improve(self.reworked(many, rules)?, most.div_ceil(2), rules, stats, true)?;
+        }
         let attempts = few.stats.attempts + many.stats.attempts;
         let mut best = if few.is_better_than(&many) { few } else { many };
         best.stats.attempts = attempts;
-        Ok(best)
+        Ok(Some(best))
     }
 
     /// Lowers sizes where faces prove too far away or poor, as long as that helps, and runs the front there again, with

@@ -38,7 +38,8 @@ impl Attempt {
     /// Whether there is nothing that another attempt could be asked for.
     pub(super) fn is_good(&self) -> bool {
         let Flaws { faults, crossing } = &self.flaws;
-        faults.is_empty() && crossing.is_empty() && self.quads.faces().all(|f| shortfall(&self.quads, f) == 0.0)
+        let is_sound = |f: u32| self.quads.quality(f) > 0.0 && shortfall(&self.quads, f) == 0.0;
+        faults.is_empty() && crossing.is_empty() && self.quads.faces().all(is_sound)
     }
 
     /// Whether nothing is left but poor shapes, which lack less together than one flat face.

@@ -41,7 +41,10 @@ impl Rework<'_, '_> {
         let mut spent: FxHashSet<(u32, bool)> = FxHashSet::default();
         for (face, is_far) in self.places(mesh, flaws, awake) {
             self.watch.check()?;
-            if tried == PLACES || !mesh.is_face(face) || spent.contains(&(face, is_far)) {
+            if tried == PLACES {
+                break;
+            }
+            if !mesh.is_face(face) || spent.contains(&(face, is_far)) {
                 continue;
             }
             tried += 1;

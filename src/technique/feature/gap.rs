@@ -3,6 +3,9 @@
 //! Two marked curves that meet at a small angle, or bound a strip thinner than the tolerance, force slivers between
 //! them. Within such a gap they are one curve for any purpose of the mesh, so the less sharp one is set free there. The
 //! decision is made per chain, so that one curve of a pair is kept as a whole and the other is not left in pieces.
+//!
+//! The two edges along a thin wall's rim, or along a slot's mouth, both stay unless the wall is a mere sheet: with one
+//! curve for both, the surface would fold back on itself there, and faces on a fold have no side that is out.
 
 use std::ops::ControlFlow;
 
@@ -20,8 +23,28 @@ const SAMPLES: [f64; 5] = [0.1, 0.3, 0.5, 0.7, 0.9];
 /// Curves run alongside where their directions differ by less than 30 degrees.
 const ALONGSIDE: f64 = 0.866;
 
+/// Across two curves the surface folds where its normals turn by more than 165 degrees: this is the cosine.
+const FOLDED: f64 = -0.866;
+
+/// Strips thinner than this part of the gap would need thousands of faces: one curve stands for both even on a fold.
+const THIN: f64 = 0.1;
+
+/// A fold shorter than so many gaps is a spot on a rough surface, and no wall's rim.
+const RIM: f64 = 10.0;
+
 /// The way to the other curve leads across: a curve that goes straight on is not alongside itself.
 const ACROSS: f64 = 0.5;
+
+/// What an edge has beside it.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Meeting {
+    /// No curve, or not all along.
+    Apart,
+    /// A curve within the gap.
+    Alongside,
+    /// One to which the surface turns back on itself.
+    Folded,
+}
 
 impl Curves<'_> {
     /// Unmarks sharp edges that run within `gap` of a sharper chain; returns how many.
@@ -37,14 +60,25 @@ impl Curves<'_> {
         order.sort_by_key(|&i| std::cmp::Reverse(rank[i]));
         let mut is_kept = vec![false; marked.len()];
         let mut dropped = 0;
-        for i in order {
-            let is_sharp = self.causes[marked[i]] == Some(MarkCause::Feature);
-            let beats = |other: usize| is_kept[other] && rank[other] > rank[i];
-            if is_sharp && self.runs_alongside(marked[i], gap, &tree, &marked, beats) {
-                self.causes[marked[i]] = None;
-                dropped += 1;
-            } else {
-                is_kept[i] = true;
+        for chain in order.chunk_by(|&i, &j| rank[i] == rank[j]) {
+            let beats = |other: usize| is_kept[other] && rank[other] > rank[chain[0]];
+            let meeting = |&i: &usize| {
+                let is_sharp = self.causes[marked[i]] == Some(MarkCause::Feature);
+                if is_sharp { self.meeting(marked[i], gap, &tree, &marked, beats) } else { Meeting::Apart }
+            };
+            let meetings: Vec<Meeting> = chain.iter().map(meeting).collect();
+            let length = |which: Meeting| -> f64 {
+                let all = chain.iter().zip(&meetings).filter(|(_, meeting)| **meeting == which);
+                all.map(|(&i, _)| self.length(marked[i])).sum()
+            };
+            let folded = length(Meeting::Folded);
+            let stays = folded > length(Meeting::Alongside) && folded > RIM * gap;
+            for (&i, meeting) in chain.iter().zip(&meetings) {
+                is_kept[i] = stays || *meeting == Meeting::Apart;
+                if !is_kept[i] {
+                    self.causes[marked[i]] = None;
+                    dropped += 1;
+                }
             }
         }
         dropped
@@ -94,30 +128,46 @@ impl Curves<'_> {
     }
 
     /// Whether all of the edge has one of the `beating` edges beside it.
-    fn runs_alongside(
+    fn meeting(
         &self,
         e: EdgeId,
         gap: f64,
         tree: &SegmentBvh,
         marked: &[EdgeId],
         beating: impl Fn(usize) -> bool,
-    ) -> bool {
+    ) -> Meeting {
         let [a, b] = self.ends(e);
-        let Some(direction) = (b - a).try_normalize() else { return false };
-        SAMPLES.iter().all(|&t| {
+        let Some(direction) = (b - a).try_normalize() else { return Meeting::Apart };
+        let mut folded = 0;
+        for t in SAMPLES {
             let p = a + t * (b - a);
             let area = Aabb::of([p]).grown(gap);
-            let found = tree.for_each_in(&area, |index, &[c, d]| {
+            let (mut is_beside, mut folds) = (false, false);
+            let _ = tree.for_each_in(&area, |index, &[c, d]| {
                 let other = index as usize;
                 let away = closest_on_segment(p, [c, d]).point - p;
-                let is_beside = marked[other] != e
+                if marked[other] != e
                     && beating(other)
                     && away.length_squared() <= gap * gap
                     && away.dot(direction).abs() <= ACROSS * away.length()
-                    && (d - c).normalize_or_zero().dot(direction).abs() >= ALONGSIDE;
-                if is_beside { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+                    && (d - c).normalize_or_zero().dot(direction).abs() >= ALONGSIDE
+                {
+                    is_beside = true;
+                    folds |= away.length() >= THIN * gap && self.fold(e, marked[other]);
+                }
+                ControlFlow::Continue::<()>(())
             });
-            found.is_break()
-        })
+            if !is_beside {
+                return Meeting::Apart;
+            }
+            folded += usize::from(folds);
+        }
+        if 2 * folded > SAMPLES.len() { Meeting::Folded } else { Meeting::Alongside }
+    }
+
+    /// Whether the surface turns back on itself between two edges.
+    fn fold(&self, e: EdgeId, other: EdgeId) -> bool {
+        let normals = |e: EdgeId| self.edges.sides(e).iter().map(|side| self.normals[side.face]);
+        normals(e).any(|n| normals(other).any(|m| n.dot(m) < FOLDED))
     }
 }

@@ -6,7 +6,7 @@
 //! least two thirds of `angle` whose direction differs by less than 30 degrees. Then chains with a loose end are
 //! dropped if they are shorter than 0.5 % of the bounding box's diagonal, or have fewer than three edges and no seed;
 //! a long crease that a CAD tessellation draws as one edge so stays.
-//! Of curves that run alongside each other within `gap` only the sharpest stays (see `gap`).
+//! Of curves that run alongside each other within `gap` only the sharpest stays, except about thin walls (see `gap`).
 //! Rims are always curves; so are borders of regions and face groups where asked for. A corner is a vertex where the
 //! number of curve edges is not 2, or where the curve turns by more than `corner_angle`.
 //!
@@ -31,7 +31,9 @@ pub use sharpness::normals as reliable_normals;
 
 use std::collections::BTreeSet;
 
-use crate::mesh::id::Edge;
+use glam::DVec3;
+
+use crate::mesh::id::{Edge, Face};
 use crate::mesh::topology::EdgeTable;
 use crate::mesh::{EdgeMark, FaceId, Freedom, IdVec, MarkCause, Surface, VertexId};
 use crate::watch::{Cancelled, Watch};
@@ -49,7 +51,8 @@ pub struct FeatureRules {
     pub region_borders: bool,
     /// The geodesic radius of normal voting; without it the plain angles between faces count.
     pub voting_radius: Option<f64>,
-    /// Of curves that run alongside each other within this distance only the sharpest is marked; mesh units.
+    /// Of curves that run alongside each other within this distance only the sharpest is marked; both where the surface
+    /// turns back on itself across them. Mesh units.
     pub gap: f64,
 }
 
@@ -82,6 +85,8 @@ pub struct Report {
 struct Curves<'a> {
     surface: &'a Surface,
     edges: EdgeTable,
+    /// The normals that count.
+    normals: IdVec<Face, DVec3>,
     /// Angle between the normals in degrees; 0 on rims.
     angles: IdVec<Edge, f64>,
     /// Why the edge is on a curve.
@@ -152,7 +157,7 @@ impl<'a> Curves<'a> {
         };
         let angles = sharpness::angles(&edges, &normals);
         let causes = edges.keys().iter().map(|key| surface.carried.marks.get(key).map(|m| m.cause)).collect();
-        Ok(Self { surface, edges, angles, causes })
+        Ok(Self { surface, edges, normals, angles, causes })
     }
 
     fn facet_angle(&self, rules: &FeatureRules) -> Option<f64> {

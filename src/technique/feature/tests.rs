@@ -93,21 +93,41 @@ fn a_short_loose_chain_is_dropped() {
     assert_eq!((report.sharp_edges, report.rim_edges), (0, 4));
 }
 
+/// Strips along y over a profile in the plane y = 0, each of `columns` cells of length 1.
+fn extruded(profile: &[(f64, f64)], columns: u32) -> Surface {
+    let strips = profile.len() as u32;
+    let point = |i: u32, &(x, z): &(f64, f64)| DVec3::new(x, f64::from(i), z);
+    let points = (0..=columns).flat_map(|i| profile.iter().map(move |at| point(i, at))).collect();
+    let mut faces = Vec::new();
+    for (i, k) in (0..columns).flat_map(|i| (0..strips - 1).map(move |k| (i, k))) {
+        let corner = |i: u32, k: u32| VertexId::from_raw(strips * i + k);
+        let [a, b, c, d] = [corner(i, k), corner(i, k + 1), corner(i + 1, k + 1), corner(i + 1, k)];
+        faces.extend([[a, b, c], [a, c, d]]);
+    }
+    Surface { points, faces: faces.into(), carried: crate::mesh::Carried::default() }
+}
+
+#[test]
+fn both_edges_of_a_thin_rim_stay() {
+    // A wall with a top 0.01 wide, and a slot as narrow.
+    let wall = [(0.0, 0.0), (0.0, 1.0), (0.01, 1.0), (0.01, 0.0)];
+    let slot = [(-1.0, 0.0), (0.0, 0.0), (0.0, -1.0), (0.01, -1.0), (0.01, 0.0), (1.0, 0.0)];
+    // A step as low has one edge, and so has a wall with a bevel.
+    let step = [(-1.0, 0.0), (0.0, 0.0), (0.0, 0.01), (1.0, 0.01)];
+    let bevel = [(-1.0, 0.0), (0.0, 0.0), (0.01, -0.01), (0.01, -1.0)];
+    let sheet = wall.map(|(x, z)| (0.1 * x, z));
+    for (profile, sharp) in [(&wall[..], 2), (&slot, 4), (&step, 1), (&bevel, 1), (&sheet, 1)] {
+        let (_, report) = find(&extruded(profile, 6), &FeatureRules { gap: 0.05, ..RULES });
+        assert_eq!(report.sharp_edges, 6 * sharp, "{profile:?}");
+    }
+}
+
 #[test]
 fn of_two_curves_that_run_alongside_only_the_sharper_stays() {
     // A trough of three strips over a long floor: two creases 0.01 apart, the left one sharper.
     let profile = [(-1.0, 1.5), (0.0, 0.0), (0.01, 0.002), (1.0, 2.0)];
-    let columns = 6_u32;
-    let point = |i: u32, k: usize| DVec3::new(profile[k].0, f64::from(i), profile[k].1);
-    let points = (0..=columns).flat_map(|i| (0..4).map(move |k| point(i, k))).collect();
-    let mut faces = Vec::new();
-    for i in 0..columns {
-        for k in 0..3 {
-            let [a, b, c, d] = [4 * i + k, 4 * i + k + 1, 4 * (i + 1) + k + 1, 4 * (i + 1) + k].map(VertexId::from_raw);
-            faces.extend([[a, b, c], [a, c, d]]);
-        }
-    }
-    let trough = Surface { points, faces: faces.into(), carried: crate::mesh::Carried::default() };
+    let columns = 6;
+    let trough = extruded(&profile, columns);
     let (_, all) = find(&trough, &RULES);
     let (marked, thinned) = find(&trough, &FeatureRules { gap: 0.05, ..RULES });
     assert_eq!(all.sharp_edges, 2 * columns as usize);

@@ -68,13 +68,16 @@ impl Layout<'_> {
             self.cell[f] = cell;
         }
         self.faces[cell as usize].extend(&fan);
-        if !self.retrace(other) {
+        // Paths begin at other faces of both now. There is no ring yet where room is made.
+        let holds = self.retrace(other) && self.retrace(cell);
+        if !holds {
             for &f in &fan {
                 self.cell[f] = other;
             }
             self.faces[cell as usize].retain(|f| !fan.contains(f));
             self.faces[other as usize].extend(&fan);
             self.retrace(other);
+            self.retrace(cell);
             return None;
         }
         moved.extend(fan.into_iter().map(|f| (f, other)));
@@ -94,5 +97,83 @@ impl Layout<'_> {
             self.set_ring(cell, ring);
         }
         holds
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Corner;
+    use super::*;
+    use crate::mesh::id::{Face, Vertex};
+    use crate::mesh::{IdVec, Surface};
+    use crate::technique::layout::Ground;
+
+    const N: u32 = 16;
+
+    fn id(x: u32, y: u32) -> VertexId {
+        VertexId::from_raw(y * (N + 1) + x)
+    }
+
+    /// A square of N by N cells of two triangles each.
+    fn square() -> Surface {
+        let places = (0..=N).flat_map(|y| (0..=N).map(move |x| (x, y)));
+        let points = places.map(|(x, y)| glam::dvec3(f64::from(x), f64::from(y), 0.0)).collect();
+        let cells = (0..N * N).map(|i| (i % N, i / N));
+        let corners = cells.map(|(x, y)| [id(x, y), id(x + 1, y), id(x + 1, y + 1), id(x, y + 1)]);
+        let faces = corners.flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+        Surface { points, faces, ..Surface::default() }
+    }
+
+    /// The square cut into upright strips of these widths, with nodes at their ends.
+    fn strips<'g>(ground: &'g Ground<'g>, widths: &[u32]) -> Layout<'g> {
+        let ends: Vec<u32> = widths
+            .iter()
+            .scan(0, |x, w| {
+                *x += w;
+                Some(*x)
+            })
+            .collect();
+        let strip = |x: u32| ends.iter().position(|&end| x < end).unwrap() as u32;
+        let cell: IdVec<Face, u32> = (0..2 * N * N).map(|f| strip(f / 2 % N)).collect();
+        let mut node: IdVec<Vertex, bool> = IdVec::filled(false, ground.surface.points.len());
+        for &x in ends.iter().chain([&0]) {
+            (0..=N).step_by(4).for_each(|y| node[id(x, y)] = true);
+        }
+        let fixed = node.clone();
+        let (layout, bad) = Layout::new(ground, cell, widths.len(), node, fixed);
+        assert_eq!(bad, []);
+        layout
+    }
+
+    fn sorted(ring: &[Corner]) -> Vec<(VertexId, FaceId, u8)> {
+        let mut all: Vec<_> = ring.iter().map(|c| (c.node, c.side.face, c.side.corner)).collect();
+        all.sort_unstable();
+        all
+    }
+
+    #[test]
+    fn rings_are_right_whether_or_not_there_was_room() {
+        let surface = square();
+        let ground = Ground::new(&surface);
+        let (mut moved, mut refused) = (0, 0);
+        for widths in [&[2, 1, 1, 1, 1, 10][..], &[3, 2, 1, 2, 8], &[5, 1, 1, 9], &[1; N as usize]] {
+            let mut layout = strips(&ground, widths);
+            let corners: Vec<usize> = layout.cells().map(|c| layout.ring(c).len()).collect();
+            for k in 0..400_u32 {
+                let v = id(1 + k * 7 % (N - 1), 1 + k * 11 % (N - 1));
+                let cell = layout.cell_of(ground.faces_at.of(v)[k as usize % ground.faces_at.of(v).len()]);
+                let mut taken = Vec::new();
+                match layout.absorb(cell, v, DEPTH, &mut taken) {
+                    Some(()) => moved += 1,
+                    None => refused += usize::from(!taken.is_empty()),
+                }
+                for c in layout.cells() {
+                    let ring = layout.trace(c).expect("a disk");
+                    assert_eq!(sorted(&ring), sorted(layout.ring(c)), "{widths:?}, {k}: cell {c}");
+                    assert_eq!(ring.len(), corners[c as usize]);
+                }
+            }
+        }
+        assert!(moved > 20 && refused > 5, "{moved} moved, {refused} refused on the way");
     }
 }
