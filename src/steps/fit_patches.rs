@@ -5,8 +5,8 @@
 //! by least squares over the covered vertices, and places on the faces where there are none, each by the area around it,
 //! with a thin-plate term and corrected parameters that start from mean value coordinates. Patches beyond the tolerance get
 //! twice the spans and more, where that helps.
-//! With `g1` both patches of a smooth seam are drawn into common tangent planes, as far as the tolerance allows. The work
-//! is done by `technique::patches`.
+//! With `g1` both patches of a smooth seam are drawn into common tangent planes, as far as the tolerance allows, and get
+//! more spans where their seams still bend by more than two degrees. The work is done by `technique::patches`.
 //!
 //! Based on: T. Itoh, A. Yamada, T. Furuhata, K. Inoue, K. Shimada. Rough Quadrilateralation of Triangular Meshes via
 //! Belt-like Subregioning for Surface Reconstruction. IBM Research Report RT0354, 2000, section 4, which fits patches by
@@ -184,7 +184,7 @@ pub struct Step;
 
 impl StepContract for Step {
     const NAME: &'static str = "fit-patches";
-    const REVISION: u32 = 6;
+    const REVISION: u32 = 7;
     const INPUTS: &'static [InputDef] = &[
         InputDef { name: "from", accepts: &[Port::Quads], required: true, doc: "coarse quads with what they cover" },
         InputDef {

@@ -6,8 +6,8 @@ use super::flatten::flatten;
 use super::frame::Frame;
 use super::solve::{Curve, Samples, fit_inside, fit_tangent};
 use super::tangent::Tangency;
-use super::{FitRules, on_side};
-use crate::mesh::geometry::Aabb;
+use super::{FitRules, normal, on_side};
+use crate::mesh::geometry::{self, Aabb};
 use crate::mesh::patches::Patch;
 
 /// An element on its way to a patch.
@@ -15,12 +15,24 @@ pub(super) struct Fit {
     pub(super) spans: usize,
     pub(super) samples: Samples,
     pub(super) patch: Patch,
+    /// The parameters of the samples as they were flattened. Every fit starts from them: corrected ones of a fit that was
+    /// refined since crowd where that one swung, and lead the next one there.
+    flat: Vec<[f64; 2]>,
+    /// What the stages began with last time, and what they came to.
+    last: [Option<(Start, State)>; 3],
 }
+
+/// The patch and the parameters of its samples.
+type State = (Patch, Vec<[f64; 2]>);
+
+/// The state before a stage, and the planes that it shall reach.
+type Start = (State, Vec<Vec<(f64, DVec3)>>);
 
 impl Fit {
     /// The samples of an element, still without a patch.
     pub(super) fn begin(frame: &Frame<'_>, element: usize) -> Self {
-        Self { spans: 0, samples: flatten(frame, element), patch: Patch::default() }
+        let samples = flatten(frame, element);
+        Self { spans: 0, flat: samples.places.clone(), samples, patch: Patch::default(), last: Default::default() }
     }
 
     /// Fits the inside under the curves given, and corrects the parameters.
@@ -35,11 +47,47 @@ impl Fit {
         /// Rounds of parameter correction; later ones change little.
         const ROUNDS: usize = 3;
         self.set_border(frame, element, spans, curves);
-        for _ in 0..ROUNDS {
-            self.fill(rules.fairness);
-            self.correct();
+        self.samples.places.clone_from(&self.flat);
+        self.stage(0, Vec::new(), |fit| {
+            for _ in 0..ROUNDS {
+                fit.fill(rules.fairness);
+                fit.correct();
+            }
+            fit.fill(rules.fairness);
+        });
+    }
+
+    /// Fits the inside again under curves that were levelled.
+    pub(super) fn solve_level(
+        &mut self,
+        frame: &Frame<'_>,
+        element: usize,
+        spans: usize,
+        curves: &[Curve],
+        rules: &FitRules,
+    ) {
+        self.set_border(frame, element, spans, curves);
+        self.stage(1, Vec::new(), |fit| fit.fill(rules.fairness));
+    }
+
+    /// Does the work of a stage, unless it would begin with the same as last time.
+    fn stage(&mut self, number: usize, planes: Vec<Vec<(f64, DVec3)>>, work: impl FnOnce(&mut Self)) {
+        let start = (self.state(), planes);
+        match &self.last[number] {
+            Some((last, end)) if *last == start => self.set_state(end.clone()),
+            _ => {
+                work(self);
+                self.last[number] = Some((start, self.state()));
+            }
         }
-        self.fill(rules.fairness);
+    }
+
+    fn state(&self) -> State {
+        (self.patch.clone(), self.samples.places.clone())
+    }
+
+    fn set_state(&mut self, state: State) {
+        (self.patch, self.samples.places) = state;
     }
 
     /// Fits the inside. Where vertices crowd in a part of a winding element, they say little of the rest, and the fit may
@@ -96,36 +144,63 @@ impl Fit {
         normals: &[Vec<(f64, DVec3)>],
         rules: &FitRules,
     ) {
-        /// A slope of one counts as much as a distance of so many times the tolerance: of 100, two degrees as three and
-        /// a half. Less where the patch would leave the tolerance for it.
-        const REACH: [f64; 4] = [100.0, 30.0, 10.0, 3.0];
-        /// The thin-plate term counts more here, for slopes alone leave room to swing.
-        const FAIR: f64 = 1e-3;
-        let planes = self.tangencies(frame, element, normals);
-        if planes.is_empty() {
+        /// Rounds of tangency and corrected parameters.
+        const ROUNDS: usize = 3;
+        let own: Vec<Vec<(f64, DVec3)>> = frame.sides[element].iter().map(|&(arc, _)| normals[arc].clone()).collect();
+        if own.iter().all(Vec::is_empty) {
             return;
         }
-        let fairness = rules.fairness.max(FAIR);
-        let (before, folds) = ((self.patch.clone(), self.samples.places.clone()), self.folds());
-        for reach in REACH {
-            fit_tangent(&mut self.patch, &self.samples, fairness, (&planes, reach * rules.tolerance));
-            self.correct();
-            if self.error() <= rules.tolerance && self.folds() <= folds && !self.swings() {
-                return;
+        self.stage(2, own.clone(), |fit| {
+            for _ in 0..ROUNDS {
+                fit.reach_planes(&fit.tangencies(&frame.sides[element], &own), rules);
             }
-            (self.patch, self.samples.places) = before.clone();
+        });
+    }
+
+    /// Fits the inside with derivatives in the planes given, as strongly as brings the patch nearest to them.
+    fn reach_planes(&mut self, planes: &[Tangency], rules: &FitRules) {
+        /// A slope of one counts as much as a distance of so many times the tolerance: of 100, two degrees as three and
+        /// a half. Less where the patch would leave the tolerance or fold for it.
+        const REACH: [f64; 5] = [100.0, 30.0, 10.0, 3.0, 300.0];
+        /// The thin-plate term counts more here, for slopes alone leave room to swing.
+        const FAIR: f64 = 1e-3;
+        /// Of the angle allowed: nearer than this, nothing stronger or weaker is tried.
+        const NEAR: f64 = 0.5;
+        let near = NEAR * rules.smooth.unwrap_or(0.0);
+        let (before, folds) = (self.state(), self.folds());
+        let mut best = (self.bend(planes), before.clone());
+        for reach in REACH {
+            self.set_state(before.clone());
+            fit_tangent(&mut self.patch, &self.samples, rules.fairness.max(FAIR), (planes, reach * rules.tolerance));
+            self.correct();
+            let bend = self.bend(planes);
+            if bend < best.0 && self.error() <= rules.tolerance && self.folds() <= folds && !self.swings() {
+                best = (bend, self.state());
+                if bend <= near {
+                    break;
+                }
+            }
         }
+        self.set_state(best.1);
+    }
+
+    /// The largest angle of the patch with planes that it shall have, degrees.
+    fn bend(&self, planes: &[Tangency]) -> f64 {
+        let bend = |plane: &Tangency| {
+            let angle = geometry::angle(normal(&self.patch, plane.place), plane.normal).to_degrees();
+            angle.min(180.0 - angle)
+        };
+        planes.iter().map(bend).fold(0.0, f64::max)
     }
 
     /// Where the patch shall have the planes given.
-    fn tangencies(&self, frame: &Frame<'_>, element: usize, normals: &[Vec<(f64, DVec3)>]) -> Vec<Tangency> {
+    fn tangencies(&self, sides: &[(usize, bool)], normals: &[Vec<(f64, DVec3)>]) -> Vec<Tangency> {
         /// Of the patch's size, what a derivative counts as at least.
         const LEAST: f64 = 0.2;
-        let sides = &frame.sides[element];
         let size = self.samples.weights.iter().sum::<f64>().max(0.0).sqrt().max(f64::MIN_POSITIVE);
         let mut planes = Vec::new();
-        for (side, &(arc, is_along)) in sides.iter().enumerate() {
-            for &(t, normal) in &normals[arc] {
+        for (side, &(_, is_along)) in sides.iter().enumerate() {
+            for &(t, normal) in &normals[side] {
                 let place = on_side(side, sides.len(), if is_along { t } else { 1.0 - t });
                 // Of a triangle the side v = 1 is a point, and the last side is u = 0.
                 let is_along_u = side % 2 == 1 || sides.len() == 3 && side == 2;

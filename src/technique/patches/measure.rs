@@ -15,22 +15,25 @@ use crate::metric::summary::rms;
 /// How far each patch and the mesh are apart: largest and root mean square distance, both ways.
 pub(super) struct Distances {
     surface: TriangleBvh,
+    /// Places of patches as they were measured last, each with its distance: most do not move between two rounds.
+    last: (Vec<DVec3>, Vec<f64>),
 }
 
 impl Distances {
     pub(super) fn from(surface: &Surface) -> Self {
-        Self { surface: TriangleBvh::of_surface(surface) }
+        Self { surface: TriangleBvh::of_surface(surface), last: Default::default() }
     }
 
     /// Of each element: of its vertices from all patches together, and of places of its patch from the mesh. So a patch
     /// that reaches out over a notch in the border counts as what it is.
-    pub(super) fn of(&self, frame: &Frame<'_>, fits: &[Fit]) -> Vec<(f64, f64)> {
+    pub(super) fn of(&mut self, frame: &Frame<'_>, fits: &[Fit]) -> Vec<(f64, f64)> {
         /// Elements of the mesh for distances along a side of a patch.
         const FINE: usize = 16;
         let patches: Vec<Patch> = fits.iter().map(|fit| fit.patch.clone()).collect();
         let fine: Soup = tessellate(frame, &patches, FINE);
         let tree = TriangleBvh::of_surface(&triangles(&fine));
-        let out: Vec<f64> = fine.points.as_slice().par_iter().map(|&p| distance(&self.surface, p)).collect();
+        self.measure(fine.points.as_slice());
+        let out = &self.last.1;
         let facets: Vec<&Facet> = fine.faces.iter().collect();
         let ground = frame.layout.ground;
         let of_element = |(e, fit): (usize, &Fit)| {
@@ -54,6 +57,15 @@ impl Distances {
             (all.iter().copied().fold(0.0, f64::max), rms(&all).unwrap_or(0.0))
         };
         fits.par_iter().enumerate().map(of_element).collect()
+    }
+
+    fn measure(&mut self, points: &[DVec3]) {
+        let (places, distances) = &self.last;
+        let again = |(k, &p): (usize, &DVec3)| match places.get(k) {
+            Some(&last) if last == p => distances[k],
+            _ => distance(&self.surface, p),
+        };
+        self.last = (points.to_vec(), points.par_iter().enumerate().map(again).collect());
     }
 }
 

@@ -7,8 +7,9 @@
 //! Patches meet in common curves, which follow the paths without their zigzag; the angle between their tangent planes is
 //! measured. On demand smooth seams get a common plane at each of their points:
 //! curves leave their nodes in one plane, and the control points next to a seam are drawn into the mean of the planes of
-//! both patches, by the same least squares, as far as the tolerance allows and no patch folds. That is tangent continuity
-//! within a tolerance, not to the last digit, which bicubic patches round any node cannot have.
+//! both patches, by the same least squares, as far as the tolerance allows and no patch folds. Patches whose smooth seams
+//! still bend too much get more spans. That is tangent continuity within a tolerance, not to the last digit, which bicubic
+//! patches round any node cannot have.
 //!
 //! Based on: M. Eck, H. Hoppe. Automatic Reconstruction of B-Spline Surfaces of Arbitrary Topological Type. SIGGRAPH,
 //! 1996; J. Hoschek. Intrinsic Parametrization for Approximation. CAGD 5, 1988.
@@ -35,7 +36,7 @@ use frame::{Frame, covered, frame};
 use measure::{Distances, seams};
 use refine::Spans;
 use solve::{Curve, fit_curve, fit_curve_with};
-use tangent::{end_planes, is_inside};
+use tangent::{EndPlanes, end_planes, is_inside};
 
 /// How patches are fitted.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -75,7 +76,7 @@ pub fn fit_patches(surface: &Surface, quads: &Quads, rules: &FitRules, watch: &W
     watch.phase("fit", None);
     let mut fits: Vec<Fit> = (0..frame.sides.len()).into_par_iter().map(|e| Fit::begin(&frame, e)).collect();
     let mut spans = Spans::new(fits.len());
-    let distances = Distances::from(&surface);
+    let mut distances = Distances::from(&surface);
     loop {
         watch.check()?;
         let counts = spans.counts();
@@ -83,8 +84,8 @@ pub fn fit_patches(surface: &Surface, quads: &Quads, rules: &FitRules, watch: &W
         fits.par_iter_mut().enumerate().for_each(|(e, fit)| fit.solve(&frame, e, counts[e], &curves, rules));
         if rules.smooth.is_some() {
             watch.check()?;
-            level(&frame, &mut curves);
-            smooth(&frame, &mut fits, counts, &curves, rules);
+            let planes = level(&frame, &mut curves);
+            smooth(&frame, &mut fits, counts, (&curves, &planes), rules);
         }
         watch.check()?;
         let errors = distances.of(&frame, &fits);
@@ -93,7 +94,8 @@ pub fn fit_patches(surface: &Surface, quads: &Quads, rules: &FitRules, watch: &W
         }
         let largest: Vec<f64> = errors.iter().map(|error| error.0).collect();
         let room: Vec<usize> = fits.iter().map(|fit| fit.samples.points.len()).collect();
-        if !spans.refine(&largest, &room, rules) {
+        let is_finer = spans.refine(&largest, &room, rules);
+        if !(spans.level(&seams(&frame, &fits), &largest, &room, rules) || is_finer) {
             break;
         }
     }
@@ -103,8 +105,8 @@ pub fn fit_patches(surface: &Surface, quads: &Quads, rules: &FitRules, watch: &W
     Ok(Patches { patches, seams, tessellation })
 }
 
-/// Curves that leave each node in the planes that their sectors have there.
-fn level(frame: &Frame<'_>, curves: &mut [Curve]) {
+/// Makes curves leave each node in the planes that their sectors have there; these.
+fn level(frame: &Frame<'_>, curves: &mut [Curve]) -> Vec<EndPlanes> {
     let planes = end_planes(frame, curves);
     curves.par_iter_mut().enumerate().for_each(|(arc, curve)| {
         let n = curve.controls.len();
@@ -117,26 +119,33 @@ fn level(frame: &Frame<'_>, curves: &mut [Curve]) {
             *curve = fit_curve_with(&frame.arcs[arc].points, curve.spans, next);
         }
     });
+    planes
 }
 
 /// Fits the patches again under curves that were levelled, with common planes along smooth seams.
-fn smooth(frame: &Frame<'_>, fits: &mut [Fit], spans: &[usize], curves: &[Curve], rules: &FitRules) {
-    /// Rounds of tangency and corrected parameters.
-    const ROUNDS: usize = 3;
-    fits.par_iter_mut().enumerate().for_each(|(e, fit)| {
-        fit.set_border(frame, e, spans[e], curves);
-        fit.fill(rules.fairness);
-    });
+fn smooth(
+    frame: &Frame<'_>,
+    fits: &mut [Fit],
+    spans: &[usize],
+    (curves, planes): (&[Curve], &[EndPlanes]),
+    rules: &FitRules,
+) {
+    fits.par_iter_mut().enumerate().for_each(|(e, fit)| fit.solve_level(frame, e, spans[e], curves, rules));
     // Planes are chosen once: later ones would follow what they made.
-    let normals: Vec<Vec<(f64, DVec3)>> =
-        (0..frame.arcs.len()).into_par_iter().map(|arc| seam_normals(frame, fits, curves, arc)).collect();
-    for _ in 0..ROUNDS {
-        fits.par_iter_mut().enumerate().for_each(|(e, fit)| fit.solve_tangent(frame, e, &normals, rules));
-    }
+    let normals: Vec<Vec<(f64, DVec3)>> = (0..frame.arcs.len())
+        .into_par_iter()
+        .map(|arc| seam_normals(frame, fits, curves, (arc, planes[arc])))
+        .collect();
+    fits.par_iter_mut().enumerate().for_each(|(e, fit)| fit.solve_tangent(frame, e, &normals, rules));
 }
 
 /// Along a smooth seam: shares of the curve, with the normal midway between both patches and across the curve.
-fn seam_normals(frame: &Frame<'_>, fits: &[Fit], curves: &[Curve], arc: usize) -> Vec<(f64, DVec3)> {
+fn seam_normals(
+    frame: &Frame<'_>,
+    fits: &[Fit],
+    curves: &[Curve],
+    (arc, planes): (usize, EndPlanes),
+) -> Vec<(f64, DVec3)> {
     /// Cosine between normals that tell the same plane.
     const ALIKE: f64 = 0.7;
     if !is_inside(frame, arc) {
@@ -162,11 +171,12 @@ fn seam_normals(frame: &Frame<'_>, fits: &[Fit], curves: &[Curve], arc: usize) -
         Some((t, across(t, sum)?))
     };
     let raw: Vec<(f64, DVec3)> = (0..places).filter_map(normal_at).collect();
-    smoothed(&raw).into_iter().filter_map(|(t, normal)| Some((t, across(t, normal)?))).collect()
+    smoothed(&raw, planes).into_iter().filter_map(|(t, normal)| Some((t, across(t, normal)?))).collect()
 }
 
-/// Normals along a seam without what is finer than a parabola, such as the facets of a coarse mesh.
-fn smoothed(normals: &[(f64, DVec3)]) -> Vec<(f64, DVec3)> {
+/// Normals along a seam without what is finer than a parabola, such as the facets of a coarse mesh, and as the planes at
+/// its ends have them there: the curves that meet in a node fix the planes of the patches.
+fn smoothed(normals: &[(f64, DVec3)], ends: EndPlanes) -> Vec<(f64, DVec3)> {
     let row = |t: f64| nalgebra::Vector3::new(1.0, t, t * t);
     let (mut matrix, mut right) = (nalgebra::Matrix3::zeros(), nalgebra::Matrix3::zeros());
     for &(t, n) in normals {
@@ -176,7 +186,13 @@ fn smoothed(normals: &[(f64, DVec3)]) -> Vec<(f64, DVec3)> {
     let Some(inverse) = matrix.try_inverse() else { return normals.to_vec() };
     let solution = inverse * right;
     let at = |t: f64| DVec3::from_array((solution.transpose() * row(t)).into());
-    normals.iter().filter_map(|&(t, _)| Some((t, at(t).try_normalize()?))).collect()
+    let short = [0.0, 1.0].map(at).into_iter().zip(ends).map(|(own, end)| match end {
+        Some(end) => end * end.dot(own).signum() - own,
+        None => DVec3::ZERO,
+    });
+    let short: Vec<DVec3> = short.collect();
+    let bent = |t: f64| at(t) + short[0] * (1.0 - t).powi(2) + short[1] * t.powi(2);
+    normals.iter().filter_map(|&(t, _)| Some((t, bent(t).try_normalize()?))).collect()
 }
 
 /// The mean normal of the faces beside each edge of a path, with the share of the length at which the edge ends.

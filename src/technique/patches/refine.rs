@@ -1,6 +1,12 @@
-//! Which patches get more spans: those that are not good enough, as long as more spans help.
+//! Which patches get more spans: those too far from the mesh, as long as more spans help, and those whose seams bend.
+
+use std::collections::BTreeSet;
 
 use super::FitRules;
+use crate::mesh::patches::Seam;
+
+/// Seams that bend by more degrees are edges of the shape, which more spans do not level.
+const CREASE: f64 = 45.0;
 
 /// The spans of each patch in both directions, powers of two, so that knots of neighbours are nested.
 #[derive(Clone, Debug)]
@@ -47,6 +53,25 @@ impl Spans {
         changed
     }
 
+    /// Gives patches whose smooth seams bend too much the spans that common planes take; whether any got more.
+    ///
+    /// Along a seam the plane turns with the curve on it and with both patches, and a cubic cannot follow both of its sides
+    /// and the samples too. What leaves the tolerance for it is taken back by [`Self::refine`].
+    pub(super) fn level(&mut self, seams: &[Seam], errors: &[f64], samples: &[usize], rules: &FitRules) -> bool {
+        let Some(limit) = rules.smooth else { return false };
+        let steep = seams.iter().filter(|seam| seam.is_smooth && seam.angle > limit && seam.angle < CREASE);
+        let patches: BTreeSet<usize> = steep.flat_map(|seam| seam.patches).map(|patch| patch as usize).collect();
+        let mut changed = false;
+        for e in patches {
+            if !self.is_settled[e] && errors[e] <= rules.tolerance && self.has_room(e, samples[e], rules) {
+                self.tried[e] = Some((self.counts[e], errors[e]));
+                self.counts[e] *= 2;
+                changed = true;
+            }
+        }
+        changed
+    }
+
     /// With fewer samples than control points there would be nothing to go by.
     fn has_room(&self, e: usize, samples: usize, rules: &FitRules) -> bool {
         let spans = self.counts[e];
@@ -85,6 +110,28 @@ mod tests {
         }
         assert_eq!(spans.counts(), [4]);
         assert!(!spans.refine(&[0.9], &[1_000], &RULES));
+    }
+
+    #[test]
+    fn patches_beside_a_steep_smooth_seam_get_more_spans() {
+        let seam = |patches, angle, is_smooth| Seam { patches, angle, is_smooth };
+        let seams =
+            [seam([0, 1], 3.0, true), seam([1, 2], 1.9, true), seam([3, 4], 30.0, false), seam([4, 5], 60.0, true)];
+        let mut spans = Spans::new(6);
+        let samples = [1_000, 20, 1_000, 1_000, 1_000, 1_000];
+        while spans.level(&seams, &[0.5; 6], &samples, &RULES) {}
+        assert_eq!(spans.counts(), [8, 2, 1, 1, 1, 1]);
+    }
+
+    #[test]
+    fn spans_for_a_seam_that_cost_the_tolerance_are_taken_back() {
+        let seams = [Seam { patches: [0, 1], angle: 3.0, is_smooth: true }];
+        let rules = FitRules { max_spans: 2, ..RULES };
+        let mut spans = Spans::new(2);
+        assert!(spans.level(&seams, &[0.5; 2], &[1_000; 2], &rules));
+        assert!(spans.refine(&[1.5, 0.5], &[1_000; 2], &rules));
+        assert_eq!(spans.counts(), [1, 2]);
+        assert!(!spans.level(&seams, &[0.5; 2], &[1_000; 2], &rules));
     }
 
     #[test]
