@@ -140,6 +140,19 @@ fn a_part_that_collapses_in_32_bits_is_not_written() {
 }
 
 #[test]
+fn convert_tells_what_a_format_cannot_hold() {
+    let desk = Desk::new();
+    fs::write(desk.path("named.obj"), CUBE.replacen("f ", "g lid\nf ", 1) + "g rim\nl 1 2\n").unwrap();
+    let kept = predicate::str::contains("not kept").not();
+    desk.meshmill(&["convert", "named.obj", "named.vtu"]).assert().success().stderr(kept);
+    let lost = predicate::str::contains("groups of faces `lid`").and(predicate::str::contains("groups of edges `rim`"));
+    let lost = lost.and(predicate::str::contains("try: --text"));
+    desk.meshmill(&["convert", "named.obj", "named.stl"]).assert().success().stderr(lost);
+    let points = predicate::str::contains("not kept in CSV: 12 faces");
+    desk.meshmill(&["convert", "named.obj", "named.csv"]).assert().success().stderr(points);
+}
+
+#[test]
 fn a_parameter_that_a_sweep_varies_cannot_be_set() {
     let desk = Desk::new();
     let arguments = ["sweep", "recipe.toml", "-s", "limit=0.1,0.2", "--set", "limit=0.3"];
