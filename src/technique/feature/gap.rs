@@ -23,7 +23,7 @@ const SAMPLES: [f64; 5] = [0.1, 0.3, 0.5, 0.7, 0.9];
 /// Curves run alongside where their directions differ by less than 30 degrees.
 const ALONGSIDE: f64 = 0.866;
 
-/// Across two curves the surface folds where its normals turn by more than 165 degrees: this is the cosine.
+/// Across two curves the surface folds where its normals turn by more than 150 degrees: this is the cosine.
 const FOLDED: f64 = -0.866;
 
 /// Strips thinner than this part of the gap would need thousands of faces: one curve stands for both even on a fold.
@@ -127,7 +127,7 @@ impl Curves<'_> {
         chain
     }
 
-    /// Whether all of the edge has one of the `beating` edges beside it.
+    /// What the edge has beside it, all along, of the `beating` ones.
     fn meeting(
         &self,
         e: EdgeId,
