@@ -184,7 +184,7 @@ pub struct Step;
 
 impl StepContract for Step {
     const NAME: &'static str = "fit-patches";
-    const REVISION: u32 = 7;
+    const REVISION: u32 = 8;
     const INPUTS: &'static [InputDef] = &[
         InputDef { name: "from", accepts: &[Port::Quads], required: true, doc: "coarse quads with what they cover" },
         InputDef {

@@ -61,7 +61,7 @@ use crate::watch::{Cancelled, Watch};
 #[serde(deny_unknown_fields, default, rename_all = "kebab-case")]
 pub struct RoughQuadsParams {
     /// How far apart the nodes on borders lie, which is about the size of the elements. Default 6 % of the diagonal. With
-    /// `optimize` shorter ones, down to three fifths, are tried where too many vertices would be irregular.
+    /// `optimize` shorter ones, down to half, are tried where too many vertices would be irregular.
     pub interval: Length,
     /// How thick belts are: a length, or strips of triangles as a table `{ strips = 8 }`. Default: as `interval`.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -337,7 +337,7 @@ pub struct Step;
 
 impl StepContract for Step {
     const NAME: &'static str = "rough-quads";
-    const REVISION: u32 = 6;
+    const REVISION: u32 = 7;
     const INPUTS: &'static [InputDef] = &[InputDef {
         name: "from",
         accepts: &[Port::Surface],

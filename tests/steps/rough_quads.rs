@@ -174,6 +174,32 @@ fn a_half_sphere_is_capped_with_few_irregular_nodes() {
 }
 
 #[test]
+fn no_element_stands_for_a_limb() {
+    /// Of the area that its corners span; the belts alone make elements of up to half of this.
+    const MOST: f64 = 15.0;
+    let mut horn = plate(48, |_, _| true);
+    for v in horn.points.ids() {
+        let p = &mut horn.points[v];
+        let r = (p.x - 0.5).powi(2) + (p.y - 0.5).powi(2);
+        p.z = 1.2 * libm::exp(-r / 0.01);
+    }
+    let produced = run("rough-quads", "interval = 0.15", &surface(horn.clone()));
+    let made = quads(&produced.artifact);
+    check(&horn, made);
+    let cover = made.cover.as_ref().unwrap();
+    let from = cut_again(&horn, &cover.cuts).unwrap();
+    let area = |[a, b, c]: [glam::DVec3; 3]| (b - a).cross(c - a).length() / 2.0;
+    for (element, faces) in cover.faces.enumerate() {
+        let held: f64 = faces.iter().map(|&f| area(from.corners(f))).sum();
+        let corners: Vec<_> = made.mesh.faces[element].corners().iter().map(|&v| made.mesh.points[v]).collect();
+        let middle = corners.iter().sum::<glam::DVec3>() / corners.len() as f64;
+        let spanned: f64 =
+            (0..corners.len()).map(|k| area([middle, corners[k], corners[(k + 1) % corners.len()]])).sum();
+        assert!(held <= MOST * spanned, "element {element} holds {:.1} times what it spans", held / spanned);
+    }
+}
+
+#[test]
 fn regions_of_a_closed_surface_conform() {
     let mut from = shapes::surface(&shapes::subdivided(&shapes::cube(), 5));
     let side = |f: meshmill::mesh::FaceId| {

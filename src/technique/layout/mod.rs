@@ -199,6 +199,16 @@ impl<'g> Layout<'g> {
         self.quality(&self.nodes(cell), self.area(cell).normalize_or_zero())
     }
 
+    /// How many times the area that its corners span a cell holds: 1 where it is flat, 3.1 for a cap of half a sphere,
+    /// without bound where it holds a limb. Infinite where the corners lie on a line.
+    pub fn bulge(&self, cell: u32) -> f64 {
+        let held = self.faces(cell).iter().map(|&f| self.ground.areas[f].length()).sum::<f64>() / 2.0;
+        let corners: Vec<DVec3> = self.nodes(cell).iter().map(|&v| self.ground.point(v)).collect();
+        let middle = corners.iter().sum::<DVec3>() / corners.len().max(1) as f64;
+        let triangle = |i: usize| (corners[i] - middle).cross(corners[(i + 1) % corners.len()] - middle).length() / 2.0;
+        held / (0..corners.len()).map(triangle).sum::<f64>()
+    }
+
     /// Walks once round a cell. `None` when its border has several loops, touches itself, or has under two nodes.
     fn trace(&self, cell: u32) -> Option<Vec<Corner>> {
         let inside = |f: FaceId| self.cell[f] == cell;

@@ -19,6 +19,10 @@ pub(super) const TRIANGLE: f64 = 6.0;
 /// What a node on a smooth border costs more than an inner one, because regular borders matter most.
 const BORDER: f64 = 1.5;
 
+/// New cells that hold so many times the area between their corners would stand for a limb as if it were not there:
+/// regular, and no use.
+const LIMB: f64 = 8.0;
+
 /// A node of a proposal that is not there yet.
 pub(super) fn new_node(number: usize) -> VertexId {
     VertexId::from_raw(u32::MAX - 1 - number as u32)
@@ -243,12 +247,14 @@ impl Layout<'_> {
         sum / pattern.faces.len().max(1) as f64 + worst
     }
 
-    /// Replaces, and takes it back where a new cell is worse than `least` and worse than all old ones.
+    /// Replaces, and takes it back where a new cell is worse than `least` and worse than all old ones, or holds a limb.
     pub(super) fn fill(&mut self, cells: &[u32], rim: &[VertexId], pattern: &Pattern, least: f64) -> Option<Undo> {
         let before = cells.iter().map(|&c| self.quality_of(c)).fold(f64::INFINITY, f64::min);
+        let bulge = cells.iter().map(|&c| self.bulge(c)).fold(0.0, f64::max);
         let undo = self.replace(cells, rim, pattern)?;
         let after = undo.made.iter().map(|&c| self.quality_of(c)).fold(f64::INFINITY, f64::min);
-        if after < least.min(before) {
+        let is_limb = undo.made.iter().any(|&c| self.bulge(c) > LIMB.max(bulge));
+        if after < least.min(before) || is_limb {
             self.undo(undo);
             return None;
         }
