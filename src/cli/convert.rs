@@ -45,11 +45,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Fault> {
     for what in &lost {
         say(&format!("  not kept in {}: {what}", format.title()));
     }
-    if options.binary && !lost.is_empty() {
-        let text = format::write(format, &soup, &WriteOptions { binary: false, ..options }).unwrap_or_default();
-        if self::lost(format, &soup, &text).len() < lost.len() {
-            say("  try: --text, which keeps more");
-        }
+    if options.binary
+        && !lost.is_empty()
+        && let Ok(text) = format::write(format, &soup, &WriteOptions { binary: false, ..options })
+        && self::lost(format, &soup, &text).len() < lost.len()
+    {
+        say("  try: --text, which keeps more");
     }
     Ok(Exit::Done)
 }

@@ -35,18 +35,10 @@ impl Fit {
         Self { spans: 0, flat: samples.places.clone(), samples, patch: Patch::default(), last: Default::default() }
     }
 
-    /// Fits the inside under the curves given, and corrects the parameters.
-    pub(super) fn solve(
-        &mut self,
-        frame: &Frame<'_>,
-        element: usize,
-        spans: usize,
-        curves: &[Curve],
-        rules: &FitRules,
-    ) {
+    /// Fits the inside under the border that was set, and corrects the parameters.
+    pub(super) fn solve(&mut self, rules: &FitRules) {
         /// Rounds of parameter correction; later ones change little.
         const ROUNDS: usize = 3;
-        self.set_border(frame, element, spans, curves);
         self.samples.places.clone_from(&self.flat);
         self.stage(0, Vec::new(), |fit| {
             for _ in 0..ROUNDS {
@@ -57,16 +49,8 @@ impl Fit {
         });
     }
 
-    /// Fits the inside again under curves that were levelled.
-    pub(super) fn solve_level(
-        &mut self,
-        frame: &Frame<'_>,
-        element: usize,
-        spans: usize,
-        curves: &[Curve],
-        rules: &FitRules,
-    ) {
-        self.set_border(frame, element, spans, curves);
+    /// Fits the inside again under a border that was levelled.
+    pub(super) fn solve_level(&mut self, rules: &FitRules) {
         self.stage(1, Vec::new(), |fit| fit.fill(rules.fairness));
     }
 

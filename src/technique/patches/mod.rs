@@ -81,7 +81,10 @@ pub fn fit_patches(surface: &Surface, quads: &Quads, rules: &FitRules, watch: &W
         watch.check()?;
         let counts = spans.counts();
         let mut curves = curves(&frame, counts, rules);
-        fits.par_iter_mut().enumerate().for_each(|(e, fit)| fit.solve(&frame, e, counts[e], &curves, rules));
+        fits.par_iter_mut().enumerate().for_each(|(e, fit)| {
+            fit.set_border(&frame, e, counts[e], &curves);
+            fit.solve(rules);
+        });
         if rules.smooth.is_some() {
             watch.check()?;
             let planes = level(&frame, &mut curves);
@@ -130,7 +133,10 @@ fn smooth(
     (curves, planes): (&[Curve], &[EndPlanes]),
     rules: &FitRules,
 ) {
-    fits.par_iter_mut().enumerate().for_each(|(e, fit)| fit.solve_level(frame, e, spans[e], curves, rules));
+    fits.par_iter_mut().enumerate().for_each(|(e, fit)| {
+        fit.set_border(frame, e, spans[e], curves);
+        fit.solve_level(rules);
+    });
     // Planes are chosen once: later ones would follow what they made.
     let normals: Vec<Vec<(f64, DVec3)>> = (0..frame.arcs.len())
         .into_par_iter()
