@@ -22,8 +22,11 @@
 //! Best-first order over all faces is replaced by one threshold, taken from samples and corners before any face is cut:
 //! it costs a few pieces more and makes faces independent.
 
+use std::sync::OnceLock;
+
 use glam::DVec3;
 use rayon::prelude::*;
+use rustc_hash::FxHashSet;
 use serde::{Deserialize, Serialize};
 
 use super::intersection::{Triangulated, triangulated};
@@ -33,8 +36,11 @@ use crate::mesh::geometry::triangle_area;
 use crate::mesh::{FaceId, IdVec, Soup, VertexId};
 use crate::watch::{Cancelled, Watch};
 
+mod memo;
 mod piece;
 
+pub use memo::Memo;
+use memo::{Key, key_of};
 use piece::{Limits, refine};
 
 /// A mesh prepared for distances.
@@ -44,6 +50,7 @@ pub struct Target {
     cut: Triangulated,
     triangles: Vec<[DVec3; 3]>,
     bvh: TriangleBvh,
+    keys: OnceLock<(Vec<Key>, FxHashSet<Key>)>,
 }
 
 impl Target {
@@ -51,7 +58,7 @@ impl Target {
     pub fn of(mesh: &Soup) -> Self {
         let cut = triangulated(mesh);
         let triangles = cut.coordinates(mesh);
-        Self { points: mesh.points.clone(), bvh: TriangleBvh::new(triangles.clone()), cut, triangles }
+        Self { points: mesh.points.clone(), bvh: TriangleBvh::new(triangles.clone()), cut, triangles, keys: OnceLock::new() }
     }
 
     /// The hierarchy over its triangles.
@@ -74,7 +81,25 @@ impl Target {
         let mut points = self.points.clone();
         points.iter_mut().for_each(|p| *p -= origin);
         let triangles: Vec<[DVec3; 3]> = self.triangles.iter().map(|t| t.map(|p| p - origin)).collect();
-        Self { points, cut: self.cut.clone(), bvh: TriangleBvh::new(triangles.clone()), triangles }
+        let (cut, bvh) = (self.cut.clone(), TriangleBvh::new(triangles.clone()));
+        Self { points, cut, bvh, triangles, keys: OnceLock::new() }
+    }
+
+    /// The hashes of its triangles, one by one and as a set.
+    fn hashes(&self) -> &(Vec<Key>, FxHashSet<Key>) {
+        self.keys.get_or_init(|| {
+            let keys: Vec<Key> = self.triangles.par_iter().map(key_of).collect();
+            let set = keys.iter().copied().collect();
+            (keys, set)
+        })
+    }
+
+    fn keys(&self) -> &[Key] {
+        &self.hashes().0
+    }
+
+    fn key_set(&self) -> &FxHashSet<Key> {
+        &self.hashes().1
     }
 
     /// Largest coordinate, for the size of rounding errors.
@@ -134,12 +159,14 @@ pub fn sample(triangles: &[[DVec3; 3]], count: usize) -> Vec<(u32, DVec3)> {
     (0..count).into_par_iter().map(place).collect()
 }
 
-/// Distance and nearest triangle of every vertex of `from` that a triangle of a face that is `wanted` uses; infinite for
-/// the others.
-fn corner_distances(from: &Target, to: &Target, wanted: Wanted<'_>) -> Vec<(f64, u32)> {
+/// Which triangles of the first mesh are looked at.
+type Open<'a> = &'a (dyn Fn(usize) -> bool + Sync);
+
+/// Distance and nearest triangle of every vertex of `from` that a triangle that is `open` uses; infinite for the others.
+fn corner_distances(from: &Target, to: &Target, open: Open<'_>) -> Vec<(f64, u32)> {
     let mut used = vec![false; from.points.len()];
-    for (triangle, &face) in from.cut.corners.iter().zip(&from.cut.origin) {
-        if wanted(face) {
+    for (t, triangle) in from.cut.corners.iter().enumerate() {
+        if open(t) {
             for v in triangle {
                 used[v.index()] = true;
             }
@@ -246,12 +273,12 @@ fn refine_all(
     to: &Target,
     corners: &[(f64, u32)],
     limits: &Limits,
-    wanted: Wanted<'_>,
+    open: Open<'_>,
     watch: &Watch,
 ) -> Result<Vec<piece::Bound>, Cancelled> {
     let total: f64 = summary::sum(from.triangles.iter().map(|&t| triangle_area(t)));
     let judge = |t: usize| {
-        if watch.is_cancelled() || !wanted(from.cut.origin[t]) {
+        if watch.is_cancelled() || !open(t) {
             return piece::Bound::default();
         }
         let share = if total > 0.0 { triangle_area(from.triangles[t]) / total } else { 0.0 };
@@ -278,41 +305,49 @@ pub struct Decision {
 /// Decides whether the distance from one mesh to another is at most `threshold`, refining only until each face is
 /// decided. A distance within rounding of the threshold counts as within.
 pub fn decide(from: &Target, to: &Target, threshold: f64, watch: &Watch) -> Result<Option<Decision>, Cancelled> {
-    decide_where(from, to, threshold, &|_| true, watch)
+    decide_where(from, to, threshold, &|_| true, None, watch)
 }
 
 /// Which faces matter.
 pub type Wanted<'a> = &'a (dyn Fn(FaceId) -> bool + Sync);
 
-/// The same for those faces of the first mesh that are `wanted`.
+/// The same for those faces of the first mesh that are `wanted`. What a `memo` of earlier decisions knows to be within is
+/// not looked at, and counts with the threshold towards `upper`: the outcome is the same.
 pub fn decide_where(
     from: &Target,
     to: &Target,
     threshold: f64,
     wanted: Wanted<'_>,
+    mut memo: Option<&mut Memo>,
     watch: &Watch,
 ) -> Result<Option<Decision>, Cancelled> {
     if from.triangles.is_empty() || to.triangles.is_empty() {
         return Ok(None);
     }
     if let Some((origin, [from, to])) = nearer(from, to) {
-        let mut found = decide_where(&from, &to, threshold + rounding_at(origin), wanted, watch)?;
+        let mut found = decide_where(&from, &to, threshold + rounding_at(origin), wanted, memo, watch)?;
         found.iter_mut().flat_map(|found| &mut found.beyond).for_each(|(_, at, _)| *at += origin);
         return Ok(found);
     }
-    let corners = corner_distances(from, to, wanted);
+    let known = memo.as_deref_mut().map_or_else(Vec::new, |memo| memo.known(from, to, threshold));
+    let is_known = |t: usize| known.get(t).is_some_and(|&known| known);
+    let is_wanted = |t: usize| wanted(from.cut.origin[t]);
+    let open = |t: usize| is_wanted(t) && !is_known(t);
+    let corners = corner_distances(from, to, &open);
     watch.check()?;
-    let threshold = threshold * (1.0 + 1e-9) + rounding(from, to);
-    let limits = Limits::new(threshold, 0.0, threshold, to);
-    let refined = refine_all(from, to, &corners, &limits, wanted, watch)?;
-    let mut out = Decision { holds: true, beyond: Vec::new(), undecided: Vec::new(), upper: 0.0 };
+    let limit = threshold * (1.0 + 1e-9) + rounding(from, to);
+    let refined = refine_all(from, to, &corners, &Limits::new(limit, 0.0, limit, to), &open, watch)?;
+    let upper = if known.contains(&true) { limit } else { 0.0 };
+    let mut out = Decision { holds: true, beyond: Vec::new(), undecided: Vec::new(), upper };
     for (t, bound) in refined.iter().enumerate() {
         let face = from.cut.origin[t];
         out.upper = out.upper.max(bound.upper.max(bound.lower));
-        if bound.lower > threshold {
+        if bound.lower > limit {
             out.beyond.push((face, bound.at, bound.lower));
-        } else if bound.upper > threshold {
+        } else if bound.upper > limit {
             out.undecided.push((face, bound.upper));
+        } else if let Some(memo) = memo.as_deref_mut().filter(|_| open(t)) {
+            memo.learn(from, t, bound, to);
         }
     }
     out.holds = out.beyond.is_empty() && out.undecided.is_empty();

@@ -30,7 +30,7 @@ impl Limits {
 }
 
 /// What is known of the largest distance of a face.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Bound {
     /// Not more than this.
     pub(super) upper: f64,
@@ -38,12 +38,21 @@ pub(super) struct Bound {
     pub(super) lower: f64,
     /// Where it is reached.
     pub(super) at: DVec3,
+    /// The triangles of the other mesh that show `upper`, in no order and each perhaps several times.
+    pub(super) by: SmallVec<[u32; 4]>,
 }
 
 impl Bound {
     fn reach(&mut self, distance: f64, at: DVec3) {
         if distance > self.lower {
             (self.lower, self.at) = (distance, at);
+        }
+    }
+
+    fn settle(&mut self, (upper, by): (f64, u32)) {
+        self.upper = self.upper.max(upper);
+        if !self.by.contains(&by) {
+            self.by.push(by);
         }
     }
 }
@@ -65,15 +74,19 @@ fn to_triangle(piece: &Piece, to: &Target, t: u32) -> f64 {
     piece.iter().map(squared).fold(0.0, f64::max).sqrt()
 }
 
-/// The best bound by the triangles nearest to the corners.
-fn bound_by_corners(piece: &Piece, to: &Target) -> f64 {
-    let mut best = f64::INFINITY;
+/// The best bound by the triangles nearest to the corners, with the one that gives it.
+fn bound_by_corners(piece: &Piece, to: &Target) -> (f64, u32) {
+    let mut best = (f64::INFINITY, 0);
     for (i, corner) in piece.iter().enumerate() {
         if piece[..i].iter().all(|c| c.nearest != corner.nearest) {
-            best = best.min(to_triangle(piece, to, corner.nearest));
+            best = less(best, (to_triangle(piece, to, corner.nearest), corner.nearest));
         }
     }
     best
+}
+
+fn less(a: (f64, u32), b: (f64, u32)) -> (f64, u32) {
+    if b.0 < a.0 { b } else { a }
 }
 
 /// Bounds the largest distance of a face with these corners, each given with its squared distance and nearest triangle.
@@ -97,8 +110,8 @@ pub(super) fn refine(corners: [(DVec3, (f64, u32)); 3], to: &Target, limits: &Li
         seen += 1;
         let by_corners = bound_by_corners(&piece, to);
         let accept = limits.accept.max(bound.lower + limits.slack);
-        if by_corners <= accept {
-            bound.upper = bound.upper.max(by_corners);
+        if by_corners.0 <= accept {
+            bound.settle(by_corners);
             continue;
         }
         let centre = piece.iter().map(|c| c.point).sum::<DVec3>() / piece.len() as f64;
@@ -107,9 +120,10 @@ pub(super) fn refine(corners: [(DVec3, (f64, u32)); 3], to: &Target, limits: &Li
         let known = piece.iter().map(near).fold(f64::INFINITY, f64::min);
         let Some(found) = to.bvh.closest_within(centre, known).or_else(|| to.bvh.closest(centre)) else { break };
         bound.reach(found.distance(), centre);
-        let best = by_corners.min(found.distance() + radius).min(to_triangle(&piece, to, found.index));
-        if best <= accept || radius <= limits.radius || seen >= most_pieces {
-            bound.upper = bound.upper.max(best);
+        let by_centre = (found.distance() + radius).min(to_triangle(&piece, to, found.index));
+        let best = less(by_corners, (by_centre, found.index));
+        if best.0 <= accept || radius <= limits.radius || seen >= most_pieces {
+            bound.settle(best);
             continue;
         }
         for part in cut(&piece, (centre, radius), found.index, to, accept) {

@@ -132,3 +132,46 @@ proptest! {
         prop_assert!(bound.upper - bound.lower <= 0.011 * bound.upper + 1e-4, "{bound:?}");
     }
 }
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    #[test]
+    fn a_memo_changes_no_decision(
+        a in terrain(),
+        b in terrain(),
+        moves in prop::collection::vec((any::<prop::sample::Index>(), -0.3..0.3), 1..6),
+    ) {
+        let (to, watch) = (Target::of(&b), Watch::silent());
+        let (mut there, mut back, mut a) = (Memo::default(), Memo::default(), a);
+        for (index, height) in moves {
+            let from = Target::of(&a);
+            for threshold in [0.1, 0.1, 0.3] {
+                let agree = |from: &Target, to: &Target, memo: &mut Memo| {
+                    let decide = |memo| decide_where(from, to, threshold, &|_| true, memo, &watch).unwrap().unwrap();
+                    let (with, without) = (decide(Some(memo)), decide(None));
+                    prop_assert_eq!(&with.beyond, &without.beyond);
+                    prop_assert_eq!(&with.undecided, &without.undecided);
+                    prop_assert_eq!(with.holds, without.holds);
+                    prop_assert!(!with.holds || with.upper <= threshold * (1.0 + 1e-8) + 1e-12);
+                    Ok(())
+                };
+                agree(&from, &to, &mut there)?;
+                agree(&to, &from, &mut back)?;
+            }
+            let v = VertexId::new(index.index(a.points.len()));
+            a.points[v].z += height;
+        }
+    }
+
+    #[test]
+    fn what_is_known_to_be_within_is_not_looked_at_again(a in terrain()) {
+        let target = Target::of(&a);
+        let mut memo = Memo::default();
+        let all = |memo: &mut Memo| memo.known(&target, &target, 0.5);
+        prop_assert!(!all(&mut memo).contains(&true));
+        decide_where(&target, &target, 0.5, &|_| true, Some(&mut memo), &Watch::silent()).unwrap().unwrap();
+        prop_assert!(!all(&mut memo).contains(&false));
+        prop_assert!(!memo.known(&target, &target, 0.25).contains(&true), "another threshold is another question");
+    }
+}

@@ -1,5 +1,6 @@
 //! How far quads and surface are apart, certified both ways, and where sizes must get smaller for it.
 
+use std::cell::RefCell;
 use std::ops::ControlFlow;
 
 use glam::DVec3;
@@ -8,7 +9,7 @@ use rustc_hash::FxHashSet;
 use crate::mesh::FaceId;
 use crate::mesh::bvh::SegmentBvh;
 use crate::mesh::geometry::Aabb;
-use crate::metric::distance::{Target, decide_where, upper_bound};
+use crate::metric::distance::{Memo, Target, decide_where, upper_bound};
 use crate::metric::intersection::{faces_of, self_intersections};
 use crate::technique::ground::Ground;
 use crate::technique::mixed::Mixed;
@@ -26,6 +27,8 @@ pub(super) struct Check {
     regions: Vec<u32>,
     /// Whether it meets itself nowhere, so that quads should not either.
     is_simple: bool,
+    /// What whole meshes showed to be within the tolerance, from them and to them.
+    memos: [RefCell<Memo>; 2],
 }
 
 /// A place where quads and surface are too far apart.
@@ -60,7 +63,7 @@ impl Check {
         let corners = SegmentBvh::new(surface.points.iter().map(|&p| [p, p]).collect());
         let soup = surface.to_soup();
         let is_simple = self_intersections(&soup, watch)?.is_empty();
-        Ok(Self { surface: Target::of(&soup), corners, regions: ground.regions.clone(), is_simple })
+        Ok(Self { surface: Target::of(&soup), corners, regions: ground.regions.clone(), is_simple, memos: Default::default() })
     }
 
     /// All flaws of a mesh.
@@ -95,7 +98,8 @@ impl Check {
         });
         let near = faces_in(mesh, &reach.grown(REACH * tolerance));
         let near = Quads { target: Target::of(&mesh.soup_of(&near)), faces: near };
-        let faults = self.beyond_where(&near, tolerance, &|f| inside.contains(&f), &|f| theirs.contains(&f), watch)?;
+        let faults =
+            self.beyond_where(&near, tolerance, &|f| inside.contains(&f), &|f| theirs.contains(&f), None, watch)?;
         let mut crossing = self.crossing(mesh, &faces_in(mesh, &area), watch)?;
         crossing.retain(|f| inside.contains(f));
         Ok(Flaws { faults, crossing })
@@ -121,8 +125,10 @@ impl Check {
     ) -> Result<Vec<Fault>, Cancelled> {
         let quads = Quads { target: Target::of(&mesh.leave().0), faces: mesh.faces().collect() };
         let ours = |f: u32| awake[mesh.region(f) as usize];
-        let theirs = |f: FaceId| awake[self.regions[f.index()] as usize];
-        self.beyond_where(&quads, tolerance, &ours, &theirs, watch)
+        let regions = &self.regions;
+        let theirs = |f: FaceId| awake[regions[f.index()] as usize];
+        let [mut to, mut from] = [0, 1].map(|way: usize| self.memos[way].borrow_mut());
+        self.beyond_where(&quads, tolerance, &ours, &theirs, Some([&mut to, &mut from]), watch)
     }
 
     fn beyond_where(
@@ -131,15 +137,17 @@ impl Check {
         tolerance: f64,
         ours: &(dyn Fn(u32) -> bool + Sync),
         theirs: &(dyn Fn(FaceId) -> bool + Sync),
+        memos: Option<[&mut Memo; 2]>,
         watch: &Watch,
     ) -> Result<Vec<Fault>, Cancelled> {
         let mut found = Vec::new();
-        let decision = decide_where(target, &self.surface, tolerance, &|f| ours(faces[f.index()]), watch)?;
+        let [to, from] = memos.map_or([None, None], |memos| memos.map(Some));
+        let decision = decide_where(target, &self.surface, tolerance, &|f| ours(faces[f.index()]), to, watch)?;
         for (face, p, distance) in decision.into_iter().flat_map(|d| d.beyond) {
             let at = self.surface.bvh().closest(p).map_or(p, |c| c.nearest.point);
             found.push(Fault { face: faces[face.index()], at, distance });
         }
-        let decision = decide_where(&self.surface, target, tolerance, theirs, watch)?;
+        let decision = decide_where(&self.surface, target, tolerance, theirs, from, watch)?;
         for (_, at, distance) in decision.into_iter().flat_map(|d| d.beyond) {
             if let Some(nearest) = target.bvh().closest(at) {
                 found.push(Fault { face: faces[target.face(nearest.index).index()], at, distance });
