@@ -33,7 +33,7 @@ pub struct Memo {
 }
 
 /// A triangle that so many others show to be within is cheaper to look at again.
-const MOST_PROOFS: usize = 16;
+const MOST_PROOFS: usize = 256;
 
 impl Memo {
     /// Which triangles of a mesh are known to be within of another.
@@ -47,7 +47,10 @@ impl Memo {
     /// Keeps what was found of a triangle, where it is within.
     pub(super) fn learn(&mut self, from: &Target, triangle: usize, bound: &Bound, to: &Target) {
         if bound.upper <= self.threshold && bound.by.len() <= MOST_PROOFS {
-            let by = bound.by.iter().map(|&t| to.keys()[t as usize]).collect();
+            let mut by = bound.by.clone();
+            by.sort_unstable();
+            by.dedup();
+            let by = by.iter().map(|&t| to.keys()[t as usize]).collect();
             self.within.insert(from.keys()[triangle], by);
         }
     }

@@ -51,7 +51,7 @@ impl Bound {
 
     fn settle(&mut self, (upper, by): (f64, u32)) {
         self.upper = self.upper.max(upper);
-        if !self.by.contains(&by) {
+        if self.by.last() != Some(&by) {
             self.by.push(by);
         }
     }
