@@ -58,7 +58,13 @@ impl Target {
     pub fn of(mesh: &Soup) -> Self {
         let cut = triangulated(mesh);
         let triangles = cut.coordinates(mesh);
-        Self { points: mesh.points.clone(), bvh: TriangleBvh::new(triangles.clone()), cut, triangles, keys: OnceLock::new() }
+        Self {
+            points: mesh.points.clone(),
+            bvh: TriangleBvh::new(triangles.clone()),
+            cut,
+            triangles,
+            keys: OnceLock::new(),
+        }
     }
 
     /// The hierarchy over its triangles.

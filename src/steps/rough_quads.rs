@@ -266,6 +266,9 @@ fn excess(counts: &Counts, elements: usize) -> [f64; 2] {
 /// makes rows meet that should run on.
 const SNAP: f64 = 0.4;
 
+/// Squares of the interval that an element made by optimisation may hold, unless those before held more: three by three.
+const LARGEST: f64 = 9.0;
+
 /// Elements that a face of the mesh may be cut for.
 const MOST_ELEMENTS: f64 = 64.0;
 
@@ -294,7 +297,8 @@ fn rules(surface: &Surface, params: &RoughQuadsParams) -> Result<BeltRules, Roug
             Thickness::Length(length)
         }
     };
-    Ok(BeltRules { thickness, interval, min_angle: params.min_angle, order: Order::FromOutside, snap: SNAP })
+    let largest = LARGEST * interval * interval;
+    Ok(BeltRules { thickness, interval, largest, min_angle: params.min_angle, order: Order::FromOutside, snap: SNAP })
 }
 
 /// Each part must have a border.
@@ -337,7 +341,7 @@ pub struct Step;
 
 impl StepContract for Step {
     const NAME: &'static str = "rough-quads";
-    const REVISION: u32 = 7;
+    const REVISION: u32 = 8;
     const INPUTS: &'static [InputDef] = &[InputDef {
         name: "from",
         accepts: &[Port::Surface],

@@ -195,6 +195,7 @@ fn no_element_stands_for_a_limb() {
         let middle = corners.iter().sum::<glam::DVec3>() / corners.len() as f64;
         let spanned: f64 =
             (0..corners.len()).map(|k| area([middle, corners[k], corners[(k + 1) % corners.len()]])).sum();
+        assert!(held <= 9.0 * 0.15 * 0.15, "element {element} holds {held} of a mesh at intervals of 0.15");
         assert!(held <= MOST * spanned, "element {element} holds {:.1} times what it spans", held / spanned);
     }
 }

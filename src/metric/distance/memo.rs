@@ -16,7 +16,7 @@ pub(super) type Key = u128;
 
 pub(super) fn key_of(triangle: &[glam::DVec3; 3]) -> Key {
     let mut hasher = blake3::Hasher::new();
-    for coordinate in triangle.iter().flat_map(|p| p.to_array()) {
+    for coordinate in triangle.iter().flat_map(glam::DVec3::to_array) {
         hasher.update(&coordinate.to_le_bytes());
     }
     let mut key = [0; 16];

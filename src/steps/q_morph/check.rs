@@ -63,7 +63,13 @@ impl Check {
         let corners = SegmentBvh::new(surface.points.iter().map(|&p| [p, p]).collect());
         let soup = surface.to_soup();
         let is_simple = self_intersections(&soup, watch)?.is_empty();
-        Ok(Self { surface: Target::of(&soup), corners, regions: ground.regions.clone(), is_simple, memos: Default::default() })
+        Ok(Self {
+            surface: Target::of(&soup),
+            corners,
+            regions: ground.regions.clone(),
+            is_simple,
+            memos: Default::default(),
+        })
     }
 
     /// All flaws of a mesh.

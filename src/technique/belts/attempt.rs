@@ -58,6 +58,7 @@ pub fn attempt(
     loop {
         let ground = Ground::new(&room.surface);
         let mut layout = complex.on(&ground);
+        layout.largest = rules.largest;
         let stuck = work.go_on(&mut layout, watch)?;
         if stuck.is_empty() {
             let quads = to_quads(&layout);

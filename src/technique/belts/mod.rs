@@ -28,6 +28,8 @@ pub struct BeltRules {
     pub thickness: Thickness,
     /// How far apart nodes lie on outer loops; mesh units.
     pub interval: f64,
+    /// The area that an element made by optimisation may hold; square of the mesh's unit.
+    pub largest: f64,
     /// Connectors start where the angle is at least this; degrees.
     pub min_angle: f64,
     /// Which belts come first.

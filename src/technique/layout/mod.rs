@@ -63,6 +63,8 @@ pub struct Layout<'g> {
     node: IdVec<Vertex, bool>,
     /// Nodes that stay where they are: corners, and where borders of domains meet.
     pub fixed: IdVec<Vertex, bool>,
+    /// The area that a new cell may hold, unless the old ones hold more; square of the mesh's unit.
+    pub largest: f64,
     around: FxHashMap<VertexId, Vec<u32>>,
     /// The angle of each domain at fixed nodes, in right angles.
     corners: FxHashMap<(VertexId, u32), f64>,
@@ -92,8 +94,18 @@ impl<'g> Layout<'g> {
         let finder = Finder::new(node.len());
         let rings = vec![Vec::new(); count];
         let corners = proposal::corners(ground, &fixed);
-        let mut layout =
-            Self { ground, cell, faces, rings, node, fixed, around: FxHashMap::default(), corners, finder };
+        let mut layout = Self {
+            ground,
+            cell,
+            faces,
+            rings,
+            node,
+            fixed,
+            largest: f64::INFINITY,
+            around: FxHashMap::default(),
+            corners,
+            finder,
+        };
         let mut bad = Vec::new();
         for c in 0..count as u32 {
             let ring = if layout.is_simply_connected(c) { layout.trace(c) } else { None };
@@ -199,14 +211,18 @@ impl<'g> Layout<'g> {
         self.quality(&self.nodes(cell), self.area(cell).normalize_or_zero())
     }
 
+    /// The area of the faces of a cell.
+    pub fn held(&self, cell: u32) -> f64 {
+        self.faces(cell).iter().map(|&f| self.ground.areas[f].length()).sum::<f64>() / 2.0
+    }
+
     /// How many times the area that its corners span a cell holds: 1 where it is flat, 3.1 for a cap of half a sphere,
     /// without bound where it holds a limb. Infinite where the corners lie on a line.
     pub fn bulge(&self, cell: u32) -> f64 {
-        let held = self.faces(cell).iter().map(|&f| self.ground.areas[f].length()).sum::<f64>() / 2.0;
         let corners: Vec<DVec3> = self.nodes(cell).iter().map(|&v| self.ground.point(v)).collect();
         let middle = corners.iter().sum::<DVec3>() / corners.len().max(1) as f64;
         let triangle = |i: usize| (corners[i] - middle).cross(corners[(i + 1) % corners.len()] - middle).length() / 2.0;
-        held / (0..corners.len()).map(triangle).sum::<f64>()
+        self.held(cell) / (0..corners.len()).map(triangle).sum::<f64>()
     }
 
     /// Walks once round a cell. `None` when its border has several loops, touches itself, or has under two nodes.

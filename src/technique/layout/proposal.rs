@@ -250,10 +250,11 @@ impl Layout<'_> {
     /// Replaces, and takes it back where a new cell is worse than `least` and worse than all old ones, or holds a limb.
     pub(super) fn fill(&mut self, cells: &[u32], rim: &[VertexId], pattern: &Pattern, least: f64) -> Option<Undo> {
         let before = cells.iter().map(|&c| self.quality_of(c)).fold(f64::INFINITY, f64::min);
-        let bulge = cells.iter().map(|&c| self.bulge(c)).fold(0.0, f64::max);
+        let bulge = cells.iter().map(|&c| self.bulge(c)).fold(LIMB, f64::max);
+        let held = cells.iter().map(|&c| self.held(c)).fold(self.largest, f64::max);
         let undo = self.replace(cells, rim, pattern)?;
         let after = undo.made.iter().map(|&c| self.quality_of(c)).fold(f64::INFINITY, f64::min);
-        let is_limb = undo.made.iter().any(|&c| self.bulge(c) > LIMB.max(bulge));
+        let is_limb = undo.made.iter().any(|&c| self.bulge(c) > bulge || self.held(c) > held);
         if after < least.min(before) || is_limb {
             self.undo(undo);
             return None;

@@ -1,7 +1,7 @@
 //! Makes room for a path where the mesh has none: the borders of a cell move off the vertices that the path needs.
 
-use super::Layout;
 use super::finder::{Terrain, along};
+use super::{Corner, Layout, Side};
 use crate::mesh::{FaceId, VertexId};
 
 /// How many borders may move, one making room for the other.
@@ -90,7 +90,7 @@ impl Layout<'_> {
         if before == 0 {
             return true;
         }
-        let ring = self.trace(cell);
+        let ring = self.follow(cell).or_else(|| self.trace(cell));
         let holds = ring.as_ref().is_some_and(|ring| ring.len() == before);
         if let Some(ring) = ring {
             self.clear_ring(cell);
@@ -98,11 +98,38 @@ impl Layout<'_> {
         }
         holds
     }
+
+    /// What [`Layout::trace`] finds, in time that grows with the border: for a cell that was a disk and whose border moved
+    /// past some vertices, which leaves it one. `None` where no path begins where it did.
+    fn follow(&self, cell: u32) -> Option<Vec<Corner>> {
+        let inside = |f: FaceId| self.cell[f] == cell;
+        let is_border = |side: Side| inside(side.face) && !self.ground.beyond(side).is_some_and(inside);
+        let start = self.rings[cell as usize].iter().map(|corner| corner.side).find(|&side| is_border(side))?;
+        let (mut ring, mut at) = (Vec::new(), start);
+        for step in 0.. {
+            if step > 3 * self.faces[cell as usize].len() {
+                return None;
+            }
+            let node = self.ground.origin(at);
+            if self.node[node] {
+                ring.push(Corner { node, side: at });
+            }
+            at = self.ground.next_on_border(at, inside);
+            if at == start {
+                break;
+            }
+        }
+        // It begins as if all faces had been looked through.
+        let place = |f: FaceId| self.faces[cell as usize].iter().position(|&g| g == f);
+        let first = (0..ring.len()).min_by_key(|&k| (place(ring[k].side.face), ring[k].side.corner))?;
+        ring.rotate_left(first);
+        debug_assert_eq!(self.trace(cell).as_ref(), Some(&ring));
+        Some(ring)
+    }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::Corner;
     use super::*;
     use crate::mesh::id::{Face, Vertex};
     use crate::mesh::{IdVec, Surface};
