@@ -142,8 +142,16 @@ impl Layout<'_> {
         !self.node[v] && !self.ground.on_rim[v] && self.ground.faces_at.of(v).iter().all(|&f| self.cell[f] == cell)
     }
 
-    /// Cuts a cell along a path from rim to rim; the cells on its left and right.
+    /// Cuts a cell along a path from rim to rim; the cells on its left and right. `None` where the path has left the cell:
+    /// room made for its last leg may have taken faces beside its first.
     fn split(&mut self, cell: u32, path: &[VertexId]) -> Option<(u32, u32)> {
+        let is_inner = |w: &[VertexId]| {
+            let sides = [self.ground.side_between(w[0], w[1]), self.ground.side_between(w[1], w[0])];
+            sides.iter().all(|side| side.is_some_and(|side| self.cell[side.face] == cell))
+        };
+        if !path.windows(2).all(is_inner) {
+            return None;
+        }
         let walls: FxHashSet<[VertexId; 2]> = path.windows(2).flat_map(|w| [[w[0], w[1]], [w[1], w[0]]]).collect();
         let seed = self.ground.side_between(path[0], path[1])?.face;
         let all = std::mem::take(&mut self.faces[cell as usize]);

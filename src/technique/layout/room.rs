@@ -120,8 +120,11 @@ impl Layout<'_> {
             }
         }
         // It begins as if all faces had been looked through.
-        let place = |f: FaceId| self.faces[cell as usize].iter().position(|&g| g == f);
-        let first = (0..ring.len()).min_by_key(|&k| (place(ring[k].side.face), ring[k].side.corner))?;
+        let at_face = |&f: &FaceId| {
+            let here = (0..ring.len()).filter(|&k| ring[k].side.face == f);
+            here.min_by_key(|&k| ring[k].side.corner)
+        };
+        let first = self.faces[cell as usize].iter().find_map(at_face)?;
         ring.rotate_left(first);
         debug_assert_eq!(self.trace(cell).as_ref(), Some(&ring));
         Some(ring)
