@@ -56,7 +56,8 @@ use crate::watch::{Cancelled, Watch};
 /// Cuts a surface into coarse quads that follow its borders, each with the faces that it covers.
 ///
 /// The surface should be fine: ten edges or more along an element, see `refine`; where it has no room for an element its
-/// faces are cut in four. A closed surface must have regions.
+/// faces are cut in four. A closed surface must have regions. Needles, which CAD programs make of flat faces, become many
+/// times the faces that elements need and slow the work down: `control-properties` with `max-size` evens them out.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default, rename_all = "kebab-case")]
 pub struct RoughQuadsParams {
@@ -341,7 +342,7 @@ pub struct Step;
 
 impl StepContract for Step {
     const NAME: &'static str = "rough-quads";
-    const REVISION: u32 = 8;
+    const REVISION: u32 = 9;
     const INPUTS: &'static [InputDef] = &[InputDef {
         name: "from",
         accepts: &[Port::Surface],

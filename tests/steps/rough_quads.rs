@@ -201,6 +201,38 @@ fn no_element_stands_for_a_limb() {
 }
 
 #[test]
+fn elements_follow_a_spiral() {
+    /// Edges along the spiral, and how many of them lie on a turn.
+    const STEPS: [usize; 2] = [360, 120];
+    const ACROSS: usize = 5;
+    let at = |k: usize| {
+        let (i, j) = (k / (ACROSS + 1), k % (ACROSS + 1));
+        let turns = i as f64 / STEPS[1] as f64;
+        let (r, a) = (0.4 + 0.2 * turns + 0.1 * j as f64 / ACROSS as f64, std::f64::consts::TAU * turns);
+        dvec3(r * libm::cos(a), r * libm::sin(a), 0.0)
+    };
+    let points = (0..(STEPS[0] + 1) * (ACROSS + 1)).map(at).collect();
+    let cell = |k: usize| {
+        let a = k / ACROSS * (ACROSS + 1) + k % ACROSS;
+        let b = a + ACROSS + 1;
+        [[a, b + 1, b], [a, a + 1, b + 1]]
+    };
+    let from = shapes::surface(&shapes::triangles(points, &(0..STEPS[0] * ACROSS).flat_map(cell).collect::<Vec<_>>()));
+    for optimize in [false, true] {
+        let produced = run("rough-quads", &format!("interval = 0.2, optimize = {optimize}"), &surface(from.clone()));
+        let made = quads(&produced.artifact);
+        check(&from, made);
+        for (element, facet) in made.mesh.faces.enumerate() {
+            let corners: Vec<_> = facet.corners().iter().map(|&v| made.mesh.points[v]).collect();
+            for (k, a) in corners.iter().enumerate() {
+                let side = a.distance(corners[(k + 1) % corners.len()]);
+                assert!(side < 0.6, "a side of element {element} is {side} long at intervals of 0.2");
+            }
+        }
+    }
+}
+
+#[test]
 fn regions_of_a_closed_surface_conform() {
     let mut from = shapes::surface(&shapes::subdivided(&shapes::cube(), 5));
     let side = |f: meshmill::mesh::FaceId| {

@@ -12,6 +12,10 @@ use crate::technique::layout::Terrain;
 /// A belt without a hole whose nodes all lie within this many intervals of its centre gets one central node.
 const NEAR: f64 = 1.5;
 
+/// A belt winds, as a spiral does, where the way between its ends is so many times as long as that between the points of it
+/// that lie farthest apart.
+const WINDING: f64 = 1.25;
+
 impl Draft<'_> {
     /// Joins all inner loops to one, always the two closest ones; the vertices of the joints.
     pub(super) fn join_holes(&mut self, belt: u32, outer: &[VertexId], holes: &[Vec<VertexId>]) -> Vec<VertexId> {
@@ -51,6 +55,27 @@ impl Draft<'_> {
             return vec![centre];
         }
         let ridge: Vec<VertexId> = depth.iter().filter(|d| 5 * d.1 >= 3 * deep).map(|d| d.0).collect();
+        let straight =
+            self.ends_by_distance(&ridge, centre).and_then(|[a, b]| self.short_path(belt, &[a], &[b], outer));
+        self.node[centre] = false;
+        let winding =
+            self.ends_by_edges(&ridge, centre, belt).and_then(|[a, b]| self.short_path(belt, &[a], &[b], outer));
+        let reach = |path: &Option<Vec<VertexId>>| path.as_ref().map_or(0.0, |path| self.length(path));
+        let is_winding = reach(&winding) > WINDING * reach(&straight);
+        let chosen = if is_winding { winding } else { straight };
+        let Some(path) = chosen else {
+            self.node[centre] = true;
+            return vec![centre];
+        };
+        self.add_wall(&path);
+        for &end in [path.first(), path.last()].into_iter().flatten() {
+            self.node[end] = true;
+        }
+        path
+    }
+
+    /// The two vertices of a ridge that lie far from each other as the crow flies.
+    fn ends_by_distance(&self, ridge: &[VertexId], centre: VertexId) -> Option<[VertexId; 2]> {
         let far = |from: VertexId| {
             let from = self.ground.point(from);
             ridge.iter().copied().max_by(|&a, &b| {
@@ -58,14 +83,22 @@ impl Draft<'_> {
                 da.total_cmp(&db).then(b.cmp(&a))
             })
         };
-        let Some((a, b)) = far(centre).and_then(|a| Some((a, far(a)?))).filter(|(a, b)| a != b) else {
-            return vec![centre];
+        let a = far(centre)?;
+        far(a).filter(|&b| b != a).map(|b| [a, b])
+    }
+
+    /// The two vertices of a ridge that lie far from each other along the belt.
+    fn ends_by_edges(&self, ridge: &[VertexId], centre: VertexId, belt: u32) -> Option<[VertexId; 2]> {
+        let far = |from: VertexId| {
+            let away = self.depth_in(belt, &[from]).into_iter().filter(|(v, _)| ridge.binary_search(v).is_ok());
+            away.max_by(|a, b| a.1.cmp(&b.1).then(b.0.cmp(&a.0))).map(|(v, _)| v)
         };
-        let Some(path) = self.short_path(belt, &[a], &[b], outer) else { return vec![centre] };
-        self.node[centre] = false;
-        self.add_wall(&path);
-        (self.node[a], self.node[b]) = (true, true);
-        path
+        let a = far(centre)?;
+        far(a).filter(|&b| b != a).map(|b| [a, b])
+    }
+
+    fn length(&self, path: &[VertexId]) -> f64 {
+        path.windows(2).map(|w| self.ground.point(w[0]).distance(self.ground.point(w[1]))).sum()
     }
 
     /// Inner vertices of a belt with the number of edges between them and its outer loop, by vertex.

@@ -57,7 +57,7 @@ impl Layout<'_> {
 
     /// Brings back what a change removed. Only the last change can be undone, then the one before.
     pub fn undo(&mut self, undo: Undo) {
-        let mut touched = self.move_back(&undo.moved, undo.first);
+        let touched = self.move_back(&undo.moved, undo.first);
         for cell in undo.first..self.faces.len() as u32 {
             self.clear_ring(cell);
         }
@@ -73,23 +73,22 @@ impl Layout<'_> {
             self.faces[cell as usize] = faces;
             self.set_ring(cell, ring);
         }
-        touched.sort_unstable();
-        touched.dedup();
         for cell in touched {
             self.retrace(cell);
         }
     }
 
-    /// Moves faces back to where they came from, last first; the cells older than `first` that this changed.
+    /// Moves faces back to where they came from, last first; the cells older than `first` that this changed, in rising order.
     fn move_back(&mut self, moved: &[(FaceId, u32)], first: u32) -> Vec<u32> {
         let mut touched = Vec::new();
         for &(face, home) in moved.iter().rev() {
-            let now = self.cell[face];
-            self.faces[now as usize].retain(|&f| f != face);
-            self.faces[home as usize].push(face);
+            touched.extend([self.cell[face], home]);
             self.cell[face] = home;
-            touched.extend([now, home].into_iter().filter(|&c| c < first));
         }
+        touched.sort_unstable();
+        touched.dedup();
+        self.relist(moved.iter().rev().map(|m| m.0).collect(), &touched);
+        touched.retain(|&c| c < first);
         touched
     }
 

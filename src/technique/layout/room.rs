@@ -1,11 +1,25 @@
 //! Makes room for a path where the mesh has none: the borders of a cell move off the vertices that the path needs.
 
+use rustc_hash::{FxHashMap, FxHashSet};
+
 use super::finder::{Terrain, along};
 use super::{Corner, Layout, Side};
 use crate::mesh::{FaceId, VertexId};
 
 /// How many borders may move, one making room for the other.
 const DEPTH: usize = 3;
+
+/// Faces on their way from cell to cell. Labels and corners are right at every moment, the lists of faces once
+/// [`Layout::settle`] is done: what one vertex needs costs no more than the faces round it.
+#[derive(Debug, Default)]
+struct Moves {
+    /// The faces with their old cells.
+    faces: Vec<(FaceId, u32)>,
+    /// How many faces the cells touched have now.
+    sizes: FxHashMap<u32, usize>,
+    /// The cells touched, in order, over and over.
+    cells: Vec<u32>,
+}
 
 impl Layout<'_> {
     /// Finds a path that may run over the border of its cell, and takes the faces round such vertices from the
@@ -26,17 +40,17 @@ impl Layout<'_> {
         let terrain = Terrain { free: &usable, open: &open, cost: &cost, limit, goal: Some(b) };
         let path = finder.path(self.ground, &[from], |v| v == to, &terrain).unwrap_or_default();
         self.finder = finder;
-        let mut moved = Vec::new();
+        let mut moves = Moves::default();
         for &x in path.iter().filter(|&&x| x != from && x != to) {
             if !self.is_inside(x, cell) {
-                self.absorb(cell, x, DEPTH, &mut moved);
+                self.absorb(cell, x, DEPTH, &mut moves);
             }
         }
-        moved
+        self.settle(moves)
     }
 
     /// Takes the faces round `x`; where the neighbour is too narrow, that one takes from its own neighbour before.
-    fn absorb(&mut self, cell: u32, x: VertexId, depth: usize, moved: &mut Vec<(FaceId, u32)>) -> Option<()> {
+    fn absorb(&mut self, cell: u32, x: VertexId, depth: usize, moves: &mut Moves) -> Option<()> {
         let faces = self.ground.faces_at.of(x);
         let own = faces.iter().find(|&&f| self.cell[f] == cell)?;
         let other = faces.iter().map(|&f| self.cell[f]).find(|&c| c != cell)?;
@@ -46,14 +60,14 @@ impl Layout<'_> {
             return None;
         }
         let fan: Vec<FaceId> = faces.iter().copied().filter(|&f| self.cell[f] == other).collect();
-        if self.faces[other as usize].len() <= fan.len() + 1 {
+        if *self.size(other, moves) <= fan.len() + 1 {
             return None;
         }
         let corners = || fan.iter().flat_map(|&f| self.ground.surface.faces[f]);
         // Vertices between the ends of the fan come once in two faces; the ends come once each.
         let is_end = |v: VertexId| corners().filter(|&w| w == v).count() == 1;
         for v in corners().filter(|&v| v != x && !is_end(v)).collect::<Vec<_>>() {
-            if !self.is_inside(v, other) && (depth == 0 || self.absorb(other, v, depth - 1, moved).is_none()) {
+            if !self.is_inside(v, other) && (depth == 0 || self.absorb(other, v, depth - 1, moves).is_none()) {
                 return None;
             }
         }
@@ -63,40 +77,82 @@ impl Layout<'_> {
         if !unchanged {
             return None;
         }
-        self.faces[other as usize].retain(|f| !fan.contains(f));
-        for &f in &fan {
-            self.cell[f] = cell;
-        }
-        self.faces[cell as usize].extend(&fan);
-        // Paths begin at other faces of both now. There is no ring yet where room is made.
-        let holds = self.retrace(other) && self.retrace(cell);
-        if !holds {
-            for &f in &fan {
-                self.cell[f] = other;
-            }
-            self.faces[cell as usize].retain(|f| !fan.contains(f));
-            self.faces[other as usize].extend(&fan);
-            self.retrace(other);
-            self.retrace(cell);
-            return None;
-        }
-        moved.extend(fan.into_iter().map(|f| (f, other)));
+        self.hand_over(&fan, [other, cell], x);
+        *self.size(other, moves) -= fan.len();
+        *self.size(cell, moves) += fan.len();
+        moves.cells.extend([other, cell]);
+        moves.faces.extend(fan.into_iter().map(|f| (f, other)));
         Some(())
     }
 
-    /// Walks round a cell again after its border moved; whether it is still a disk with the same number of corners.
-    pub(super) fn retrace(&mut self, cell: u32) -> bool {
-        let before = self.rings[cell as usize].len();
-        if before == 0 {
-            return true;
+    fn size<'m>(&self, cell: u32, moves: &'m mut Moves) -> &'m mut usize {
+        moves.sizes.entry(cell).or_insert_with(|| self.faces[cell as usize].len())
+    }
+
+    /// Labels the faces of one cell round `x` as the other's. Both are disks, and what lies between the ends of the fan lies
+    /// inside the first, so both stay disks, with their corners; the paths at the ends begin at other faces.
+    fn hand_over(&mut self, fan: &[FaceId], [from, to]: [u32; 2], x: VertexId) {
+        for side in fan.iter().flat_map(|&face| (0..3).map(move |corner| Side { face, corner })) {
+            let Some(beyond) = self.ground.twin(side).filter(|twin| self.cell[twin.face] == to) else { continue };
+            if self.ground.origin(side) == x {
+                self.turn(to, beyond, Side { face: side.face, corner: (side.corner + 1) % 3 });
+            } else if self.ground.target(side) == x
+                && let Some(next) = self.ground.twin(Side { face: side.face, corner: (side.corner + 2) % 3 })
+            {
+                self.turn(from, side, next);
+            }
         }
-        let ring = self.follow(cell).or_else(|| self.trace(cell));
-        let holds = ring.as_ref().is_some_and(|ring| ring.len() == before);
-        if let Some(ring) = ring {
+        for &f in fan {
+            self.cell[f] = to;
+        }
+    }
+
+    /// Where a path of a cell began at one side, it begins at the next.
+    fn turn(&mut self, cell: u32, side: Side, next: Side) {
+        for corner in self.rings[cell as usize].iter_mut().filter(|corner| corner.side == side) {
+            corner.side = next;
+        }
+    }
+
+    /// Carries moves out on the lists of faces, and turns the rings to where they begin; the faces with their old cells.
+    fn settle(&mut self, moves: Moves) -> Vec<(FaceId, u32)> {
+        let mut met = FxHashSet::default();
+        let mut cells: Vec<u32> = moves.cells.iter().rev().copied().filter(|&c| met.insert(c)).collect();
+        cells.reverse();
+        self.relist(moves.faces.iter().map(|m| m.0).collect(), &cells);
+        for cell in cells {
+            let mut ring = self.rings[cell as usize].clone();
+            self.turn_to_first(cell, &mut ring);
+            debug_assert!(ring.is_empty() || self.trace(cell).as_ref() == Some(&ring));
             self.clear_ring(cell);
             self.set_ring(cell, ring);
         }
-        holds
+        moves.faces
+    }
+
+    /// Makes the lists of cells right after faces moved between them, in this order.
+    pub(super) fn relist(&mut self, mut moved: Vec<FaceId>, cells: &[u32]) {
+        let mut seen = FxHashSet::default();
+        // A face that moved twice is where it came last.
+        moved.reverse();
+        moved.retain(|&f| seen.insert(f));
+        for &cell in cells {
+            self.faces[cell as usize].retain(|f| !seen.contains(f));
+        }
+        for &f in moved.iter().rev() {
+            self.faces[self.cell[f] as usize].push(f);
+        }
+    }
+
+    /// Walks round a cell again after its border moved.
+    pub(super) fn retrace(&mut self, cell: u32) {
+        if self.rings[cell as usize].is_empty() {
+            return;
+        }
+        if let Some(ring) = self.follow(cell).or_else(|| self.trace(cell)) {
+            self.clear_ring(cell);
+            self.set_ring(cell, ring);
+        }
     }
 
     /// What [`Layout::trace`] finds, in time that grows with the border: for a cell that was a disk and whose border moved
@@ -119,15 +175,19 @@ impl Layout<'_> {
                 break;
             }
         }
-        // It begins as if all faces had been looked through.
+        self.turn_to_first(cell, &mut ring);
+        debug_assert_eq!(self.trace(cell).as_ref(), Some(&ring));
+        Some(ring)
+    }
+
+    /// Lets a ring begin as if all faces of the cell had been looked through.
+    fn turn_to_first(&self, cell: u32, ring: &mut [Corner]) {
         let at_face = |&f: &FaceId| {
             let here = (0..ring.len()).filter(|&k| ring[k].side.face == f);
             here.min_by_key(|&k| ring[k].side.corner)
         };
-        let first = self.faces[cell as usize].iter().find_map(at_face)?;
-        ring.rotate_left(first);
-        debug_assert_eq!(self.trace(cell).as_ref(), Some(&ring));
-        Some(ring)
+        let first = self.faces[cell as usize].iter().find_map(at_face);
+        ring.rotate_left(first.unwrap_or(0));
     }
 }
 
@@ -192,11 +252,12 @@ mod tests {
             for k in 0..400_u32 {
                 let v = id(1 + k * 7 % (N - 1), 1 + k * 11 % (N - 1));
                 let cell = layout.cell_of(ground.faces_at.of(v)[k as usize % ground.faces_at.of(v).len()]);
-                let mut taken = Vec::new();
-                match layout.absorb(cell, v, DEPTH, &mut taken) {
+                let mut moves = Moves::default();
+                match layout.absorb(cell, v, DEPTH, &mut moves) {
                     Some(()) => moved += 1,
-                    None => refused += usize::from(!taken.is_empty()),
+                    None => refused += usize::from(!moves.faces.is_empty()),
                 }
+                layout.settle(moves);
                 for c in layout.cells() {
                     let ring = layout.trace(c).expect("a disk");
                     assert_eq!(sorted(&ring), sorted(layout.ring(c)), "{widths:?}, {k}: cell {c}");

@@ -65,6 +65,7 @@ const LEAST: f64 = 0.03;
 pub fn polygonise(layout: &mut Layout<'_>, watch: &Watch) -> Result<Vec<u32>, Cancelled> {
     /// What a round does not free needs a finer mesh.
     const ROUNDS: usize = 1;
+    watch.phase("cut cells", None);
     let mut stuck = layout.make_polygons();
     for _ in 0..ROUNDS {
         if stuck.is_empty() {
@@ -88,10 +89,12 @@ pub fn optimise(layout: &mut Layout<'_>, watch: &Watch) -> Result<OptimiseReport
     let cells: Vec<f64> = layout.cells().map(|c| layout.area(c).length()).collect();
     let largest = LARGEST * cells.iter().sum::<f64>() / cells.len().max(1) as f64;
     let memory = &mut Memory { patience, largest, ..Memory::default() };
+    watch.phase("optimise", Some(ROUNDS as u64));
     layout.relax(1, memory, watch)?;
-    for _ in 0..ROUNDS {
+    for round in 0..ROUNDS {
         let before = report;
         watch.check()?;
+        watch.advance(round as u64, || format!("{} edits", report.edits + report.cavities));
         triangles::remove(layout, &mut report, watch)?;
         report.edits += local::improve(layout, memory, watch)?;
         report.cavities += cavity::improve(layout, memory, watch)?;
