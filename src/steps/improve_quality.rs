@@ -36,7 +36,7 @@ use crate::technique::collapse::{
 };
 use crate::technique::hierarchy::{Front, extract};
 use crate::technique::levels::{HierarchyReport, Recorded, Source, build};
-use crate::technique::refine::{MAX_FACES, MaxEdge, RefineError, refine};
+use crate::technique::refine::{Flips, MAX_FACES, MaxEdge, RefineError, refine};
 use crate::technique::remesh::coarsen;
 use crate::watch::{Cancelled, Watch};
 
@@ -328,7 +328,7 @@ fn refine_surface(
         Some(ResolvedSizing::Uniform(length)) => MaxEdge::Uniform(*length),
         Some(ResolvedSizing::Corners(values)) => MaxEdge::Corners(IdVec::from(values.clone())),
     };
-    let (surface, _) = refine(input.surface, &limit, max_faces, &input.locks, watch)?;
+    let (surface, _) = refine(input.surface, &limit, max_faces, Flips::None, &input.locks, watch)?;
     Ok(Some(surface))
 }
 

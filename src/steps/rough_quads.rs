@@ -57,7 +57,7 @@ use crate::watch::{Cancelled, Watch};
 ///
 /// The surface should be fine: ten edges or more along an element, see `refine`; where it has no room for an element its
 /// faces are cut in four. A closed surface must have regions. Needles, which CAD programs make of flat faces, become many
-/// times the faces that elements need and slow the work down: `control-properties` with `max-size` evens them out.
+/// times the faces that elements need and slow the work down: `refine` with `flips` evens them out.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default, rename_all = "kebab-case")]
 pub struct RoughQuadsParams {

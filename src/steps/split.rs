@@ -33,7 +33,7 @@ use crate::step::{
     StepFailure,
 };
 use crate::technique::arcs::{self, arcs};
-use crate::technique::split_curves::repair::{RepairError, flip_beside};
+use crate::technique::flat_flips::{FlipError, flip_beside};
 use crate::technique::split_curves::{SplitError as Reason, split_along};
 use crate::watch::{Cancelled, Watch};
 
@@ -102,7 +102,7 @@ pub enum SplitError {
     Curves(#[from] Reason),
     /// The surface is none.
     #[error(transparent)]
-    Repair(#[from] RepairError),
+    Repair(#[from] FlipError),
     /// A segment did not become an edge: a fault of this step.
     #[error("a segment of curve {curve} did not become an edge")]
     SegmentMissing {

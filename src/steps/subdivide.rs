@@ -107,7 +107,7 @@ impl From<SubdivideError> for StepFailure {
             SubdivideError::Refine(RefineError::TooManyFaces { .. }) => {
                 Self::failed(message).with_help("lower `times`, or raise `max-faces` if there is memory for it")
             }
-            SubdivideError::Refine(RefineError::Locks(_) | RefineError::BadLimit(_))
+            SubdivideError::Refine(RefineError::Locks(_) | RefineError::BadLimit(_) | RefineError::Flips(_))
             | SubdivideError::TooManyTimes(_) => Self::new(FailureKind::BadInput, message),
         }
     }

@@ -12,6 +12,7 @@ pub mod dispersion;
 pub mod eigen;
 pub mod feature;
 pub mod fit;
+pub mod flat_flips;
 pub mod front;
 pub mod ground;
 pub mod halve_edges;

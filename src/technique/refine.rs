@@ -9,18 +9,29 @@
 //! edges and the few that they force: a triangle on a stuck edge of length `k` always has another side of at least
 //! `k / 2`, so its other sides are only asked to be at most `3 k / 4`, and those that stay longer than their limit are
 //! stuck for the next triangle. Sizes so fall by a quarter a layer around a kept edge. Without that rule the halving
-//! would never end; with it the triangle on a stuck edge is final once its third corner is low over the middle half. Cost: linear in the faces made, times the logarithm of the longest edge over the limit.
+//! would never end; with it the triangle on a stuck edge is final once its third corner is low over the middle half.
+//! Cost: linear in the faces made, times the logarithm of the longest edge over the limit.
+//!
+//! Departure: edges between faces of one plane may be flipped before and between rounds, see [`Flips`]. The flat faces of
+//! CAD programs are fans of needles, each of which would be halved to pieces of its own.
+
+mod flips;
 
 use crate::mesh::freedom::ResolvedFreedom;
 use crate::mesh::geometry::triangle_area;
 use crate::mesh::id::{Edge, Face};
 use crate::mesh::topology::EdgeTable;
 use crate::mesh::{EdgeId, FaceId, FreedomError, IdVec, LockRules, Surface, resolve_freedom};
+use crate::technique::flat_flips::FlipError;
 use crate::technique::halve_edges::{Halved, agree_on_seams, halve_edges, predict_faces, seam_copies};
 use crate::watch::{Cancelled, Watch};
+use flips::Flattener;
 
 /// The usual limit of faces: about 3 GB of memory.
 pub const MAX_FACES: usize = 20_000_000;
+
+/// Rounds after which edges are only halved, which ends.
+const FLIP_ROUNDS: usize = 64;
 
 /// How long edges may be.
 #[derive(Clone, Debug, PartialEq)]
@@ -29,6 +40,16 @@ pub enum MaxEdge {
     Uniform(f64),
     /// Lengths at the corners of each face, linear between them.
     Corners(IdVec<Face, [f64; 3]>),
+}
+
+/// Whether edges between faces of one plane are flipped where that makes the least angle larger.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Flips {
+    /// Every face of the result lies in one face of the surface.
+    #[default]
+    None,
+    /// Where the surface moves by no more than coordinates in single precision are rounded.
+    Flat,
 }
 
 /// What was done.
@@ -42,6 +63,10 @@ pub struct Refinement {
     pub long_edges: usize,
     /// The longest edge at the end.
     pub longest: f64,
+    /// Edges flipped in all rounds.
+    pub flips: usize,
+    /// The largest distance between the diagonals of a pair of faces that was flipped.
+    pub largest_shift: f64,
 }
 
 /// Why a surface was not subdivided.
@@ -61,6 +86,9 @@ pub enum RefineError {
     /// The locks name a group that the surface does not have.
     #[error(transparent)]
     Locks(#[from] FreedomError),
+    /// There is no surface to flip edges of.
+    #[error(transparent)]
+    Flips(#[from] FlipError),
     /// The run was interrupted.
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
@@ -127,34 +155,38 @@ pub fn refine(
     surface: &Surface,
     max_edge: &MaxEdge,
     max_faces: usize,
+    flips: Flips,
     locks: &LockRules<'_>,
     watch: &Watch,
 ) -> Result<(Surface, Refinement), RefineError> {
     check_limits(max_edge)?;
     let mut report = Refinement::default();
-    let mut current = Round::new(surface.clone(), locks)?;
-    if current.may.iter().all(|&may| may) {
-        check_count(least_faces(surface, max_edge), max_faces)?;
-    }
-    let mut limit = max_edge.clone();
+    let (mut start, mut limit) = (surface.clone(), max_edge.clone());
+    let flattener = (flips == Flips::Flat).then(|| Flattener::new(surface, locks));
     watch.phase("refining", None);
+    if let Some(flattener) = &flattener {
+        flattener.flip(&mut start, &mut limit, 0, &mut report)?;
+    }
+    let mut current = Round::new(start, locks)?;
+    if current.may.iter().all(|&may| may) {
+        check_count(least_faces(&current.surface, &limit, flips), max_faces)?;
+    }
     loop {
         watch.check()?;
         let limits = current.limits(&limit);
-        let is_long = |e| current.length(e) > limits[e];
-        let asked = current.relaxed(&limits);
-        let mut halve: IdVec<Edge, bool> =
-            current.edges.keys().ids().map(|e| current.may[e] && current.length(e) > asked[e]).collect();
-        agree_on_seams(&current.copies, &current.may, &mut halve);
+        let halve = current.too_long(&limits);
         if !halve.iter().any(|&h| h) {
-            report.long_edges = current.edges.keys().ids().filter(|&e| is_long(e)).count();
+            report.long_edges = current.edges.keys().ids().filter(|&e| current.length(e) > limits[e]).count();
             report.longest = current.longest();
             return Ok((current.surface, report));
         }
-        let halved = current.halve(&halve, max_faces)?;
+        let mut halved = current.halve(&halve, max_faces)?;
         report.rounds += 1;
         report.halved += halved.midpoints.len();
         limit = inherit_limits(&limit, &current.surface, &halved);
+        if let Some(flattener) = flattener.as_ref().filter(|_| report.rounds < FLIP_ROUNDS) {
+            flattener.flip(&mut halved.surface, &mut limit, halved.first_midpoint, &mut report)?;
+        }
         current = Round::new(halved.surface, locks)?;
         let faces = current.surface.faces.len();
         watch.advance(faces as u64, || format!("{faces} faces"));
@@ -177,8 +209,9 @@ fn check_count(predicted: usize, max_faces: usize) -> Result<(), RefineError> {
 /// A lower bound of the faces that refining makes where no edge is kept, before anything is made.
 ///
 /// A part of a face has at most one piece of each of its sides, and at most the area of an equilateral triangle whose
-/// side is the limit. Where the limit varies in a face, its largest value there counts.
-fn least_faces(surface: &Surface, max_edge: &MaxEdge) -> usize {
+/// side is the limit. Where the limit varies in a face, its largest value there counts. Where edges are flipped, parts of
+/// different faces are joined, and only the area counts.
+fn least_faces(surface: &Surface, max_edge: &MaxEdge, flips: Flips) -> usize {
     let mut total = 0.0;
     for f in surface.faces.ids() {
         let corners = surface.corners(f);
@@ -188,7 +221,10 @@ fn least_faces(surface: &Surface, max_edge: &MaxEdge) -> usize {
         };
         let longest = crate::mesh::geometry::side_lengths(corners).into_iter().fold(0.0, f64::max);
         let by_area = triangle_area(corners) / (limit * limit * 3.0_f64.sqrt() / 4.0);
-        total += (longest / limit).max(by_area).max(1.0).floor();
+        total += match flips {
+            Flips::None => (longest / limit).max(by_area).max(1.0).floor(),
+            Flips::Flat => by_area,
+        };
     }
     total as usize
 }
@@ -217,6 +253,15 @@ impl Round {
 
     fn longest(&self) -> f64 {
         self.edges.keys().ids().map(|e| self.length(e)).fold(0.0, f64::max)
+    }
+
+    /// The edges to halve: those above what can be reached, and their copies.
+    fn too_long(&self, limits: &IdVec<Edge, f64>) -> IdVec<Edge, bool> {
+        let asked = self.relaxed(limits);
+        let mut halve: IdVec<Edge, bool> =
+            self.edges.keys().ids().map(|e| self.may[e] && self.length(e) > asked[e]).collect();
+        agree_on_seams(&self.copies, &self.may, &mut halve);
+        halve
     }
 
     fn halve(&self, halve: &IdVec<Edge, bool>, max_faces: usize) -> Result<Halved, RefineError> {
@@ -300,7 +345,7 @@ mod tests {
     }
 
     fn refined(mesh: &Surface, limit: f64) -> (Surface, Refinement) {
-        let result = refine(mesh, &MaxEdge::Uniform(limit), 1000, &LockRules::default(), &Watch::silent());
+        let result = refine(mesh, &MaxEdge::Uniform(limit), 1000, Flips::None, &LockRules::default(), &Watch::silent());
         let (out, report) = result.expect("refined");
         assert_eq!(validate_surface(&out), []);
         (out, report)
@@ -340,7 +385,8 @@ mod tests {
         assert_eq!(area, 0.5);
         let error = subdivide(&mesh, 40, 64, &LockRules::default(), &Watch::silent()).unwrap_err();
         assert!(matches!(error, RefineError::TooManyFaces { max_faces: 64, .. }));
-        let error = refine(&mesh, &MaxEdge::Uniform(1e-9), 64, &LockRules::default(), &Watch::silent()).unwrap_err();
+        let error = refine(&mesh, &MaxEdge::Uniform(1e-9), 64, Flips::None, &LockRules::default(), &Watch::silent())
+            .unwrap_err();
         assert!(matches!(error, RefineError::TooManyFaces { .. }));
     }
 
@@ -370,7 +416,8 @@ mod tests {
         mesh.carried.set_field(Field { name: "x".into(), support: Support::Vertex, components: 1, values });
         // Only the second sheet asks for short edges.
         let limit = MaxEdge::Corners(vec![[2.0; 3], [0.3; 3]].into());
-        let (out, _) = refine(&mesh, &limit, 10_000, &LockRules::default(), &Watch::silent()).expect("refined");
+        let (out, _) =
+            refine(&mesh, &limit, 10_000, Flips::None, &LockRules::default(), &Watch::silent()).expect("refined");
         assert_eq!(validate_surface(&out), []);
         let seams = &out.carried.seams;
         assert_eq!(seams.len(), 10);

@@ -10,7 +10,7 @@ use crate::mesh::predicate::triangle_triangle;
 use crate::mesh::{Carried, EdgeKey, FaceId, IdVec, LockRules, Rim, Surface, VertexId, edge_key, resolve_freedom};
 use crate::technique::collapse::session::{Setup, ToleranceMode, open};
 use crate::technique::collapse::{CollapseRules, Goal, Limits, Order, Priority, SizeField};
-use crate::technique::refine::{MaxEdge, refine};
+use crate::technique::refine::{Flips, MaxEdge, refine};
 use crate::technique::remesh::coarsen;
 use crate::technique::triangulate_loop::Loop;
 use crate::watch::{Cancelled, Watch};
@@ -92,7 +92,8 @@ impl Fill {
         let faces = self.triangles.iter().map(|t| t.map(VertexId::new)).collect();
         let membrane = Surface { points, faces, carried: Carried::default() };
         let locks = LockRules { rim: Rim::Exact, ..LockRules::default() };
-        let Ok((fine, _)) = refine(&membrane, &MaxEdge::Uniform(size), MOST_FACES, &locks, &Watch::silent()) else {
+        let limit = MaxEdge::Uniform(size);
+        let Ok((fine, _)) = refine(&membrane, &limit, MOST_FACES, Flips::None, &locks, &Watch::silent()) else {
             return Ok(None);
         };
         watch.check()?;

@@ -14,7 +14,6 @@
 mod cells;
 mod inherit;
 mod labels;
-pub mod repair;
 mod sites;
 #[cfg(test)]
 mod tests;
