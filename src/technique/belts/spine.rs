@@ -14,7 +14,7 @@ const NEAR: f64 = 1.5;
 
 /// A belt winds, as a spiral does, where the way between its ends is so many times as long as that between the points of it
 /// that lie farthest apart.
-const WINDING: f64 = 1.25;
+const WINDING: f64 = 2.0;
 
 impl Draft<'_> {
     /// Joins all inner loops to one, always the two closest ones; the vertices of the joints.
