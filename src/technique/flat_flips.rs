@@ -1,8 +1,7 @@
 //! Flips of edges between faces of one plane, which make faces better and leave the surface as it is.
 //!
 //! Marked and grouped edges and borders of groups and regions stay; faces keep their numbers. The sides of a
-//! quadrilateral are looked at again after its flip, so a measure that each flip raises ends it. O(F) for faces of bounded valence and as many
-//! flips.
+//! quadrilateral are looked at again after its flip, so a measure that each flip raises ends it. O((F + flips) log F).
 
 use std::collections::BTreeSet;
 
@@ -35,8 +34,6 @@ pub enum FlipError {
 pub struct Pair {
     /// The faces, which keep their numbers.
     pub faces: [FaceId; 2],
-    /// Their corners now.
-    pub old: [[VertexId; 3]; 2],
     /// Their corners after the flip.
     pub new: [[VertexId; 3]; 2],
     /// The corners on the edge now, then those that the flip joins.
@@ -47,10 +44,8 @@ impl Pair {
     fn new(mesh: &HalfedgeMesh, plan: &FlipPlan) -> Option<Self> {
         let h = halfedge_of(plan.edge);
         let faces = [mesh.face(h)?, mesh.face(twin(h))?];
-        let [i, j] = plan.ends;
-        let [c, d] = plan.apexes;
-        let corners = [i, j, c, d].map(|v| mesh.point(v));
-        Some(Self { faces, old: [[i, j, c], [j, i, d]], new: plan.new_faces(), corners })
+        let ([i, j], [c, d]) = (plan.ends, plan.apexes);
+        Some(Self { faces, new: plan.new_faces(), corners: [i, j, c, d].map(|v| mesh.point(v)) })
     }
 
     /// The faces as they are.

@@ -38,10 +38,8 @@ impl<'a> Flattener<'a> {
         first: usize,
         report: &mut Refinement,
     ) -> Result<(), RefineError> {
-        let most = surface.faces.len().saturating_mul(FLIPS);
-        let carried = surface.carried.fields.clone();
-        let fields = FaceFields::of(&carried);
-        let mut left = most;
+        let fields = FaceFields::of(surface);
+        let mut left = surface.faces.len().saturating_mul(FLIPS);
         let mut limits = Limits { faces: surface.faces.clone(), limit };
         let gains = |pair: &Pair| {
             let shift = shift(pair);
@@ -106,17 +104,17 @@ impl Limits<'_> {
 }
 
 /// The fields on faces: where two faces differ, the edge between them stays.
-struct FaceFields<'a>(Vec<(usize, &'a [f64])>);
+struct FaceFields(Vec<Field>);
 
-impl<'a> FaceFields<'a> {
-    fn of(fields: &'a [Field]) -> Self {
-        let on_faces = fields.iter().filter(|field| field.support == Support::Face);
-        Self(on_faces.map(|field| (field.components, field.values.as_slice())).collect())
+impl FaceFields {
+    fn of(surface: &Surface) -> Self {
+        Self(surface.carried.fields.iter().filter(|field| field.support == Support::Face).cloned().collect())
     }
 
     fn agree(&self, [f, g]: [FaceId; 2]) -> bool {
-        self.0.iter().all(|&(n, values)| {
-            let of = |face: FaceId| &values[n * face.index()..n * (face.index() + 1)];
+        self.0.iter().all(|field| {
+            let n = field.components;
+            let of = |face: FaceId| &field.values[n * face.index()..n * (face.index() + 1)];
             of(f) == of(g)
         })
     }
