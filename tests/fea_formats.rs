@@ -73,6 +73,20 @@ fn vtu_and_vtk_bring_everything_back() {
 }
 
 #[test]
+fn vtp_is_polygonal_data_and_has_no_second_order() {
+    let soup = rich_sample();
+    for options in [binary(), text()] {
+        let bytes = write(Format::Vtp, &soup, &options);
+        assert!(bytes.windows(15).any(|w| w == b"type=\"PolyData\""));
+        assert_eq!(read(Format::Vtp, &bytes), Ok(soup.clone()));
+        assert_eq!(Format::from_content(&bytes), Some(Format::Vtp));
+    }
+    let quadratic = WriteOptions { element: Some(Element::S8R), ..binary() };
+    let error = meshmill::format::write(Format::Vtp, &soup, &quadratic).expect_err("no such cells");
+    assert!(error.to_string().contains("second-order"), "{error}");
+}
+
+#[test]
 fn lz4_blocks_are_read() {
     // Text, but for the points: one block of 72 bytes for three points.
     let points: Vec<u8> =
@@ -169,6 +183,7 @@ proptest! {
         let bytes = write(Format::Vtu, &soup, &options);
         prop_assert_eq!(&bytes, &write(Format::Vtu, &soup, &options));
         prop_assert_eq!(read(Format::Vtu, &bytes), Ok(soup.clone()));
+        prop_assert_eq!(read(Format::Vtp, &write(Format::Vtp, &soup, &options)), Ok(soup.clone()));
         prop_assert_eq!(read(Format::Vtk, &write(Format::Vtk, &soup, &options)), Ok(soup));
     }
 
@@ -210,4 +225,4 @@ proptest! {
 }
 
 /// The formats that this file tests.
-const FORMATS: &[Format] = &[Format::Vtu, Format::Inp, Format::Msh, Format::Msh22, Format::Vtk];
+const FORMATS: &[Format] = &[Format::Vtu, Format::Vtp, Format::Inp, Format::Msh, Format::Msh22, Format::Vtk];

@@ -46,8 +46,10 @@ pub enum Format {
     Ply,
     /// Geomview's object file format.
     Off,
-    /// VTK XML, unstructured grids and polygonal data.
+    /// VTK XML, unstructured grids; reading takes polygonal data as well.
     Vtu,
+    /// VTK XML, polygonal data; reading takes unstructured grids as well.
+    Vtp,
     /// Abaqus and CalculiX input.
     Inp,
     /// Gmsh 4.1; reading takes 2.2 as well.
@@ -154,6 +156,7 @@ impl Format {
         Self::Ply,
         Self::Off,
         Self::Vtu,
+        Self::Vtp,
         Self::Inp,
         Self::Msh,
         Self::Msh22,
@@ -169,6 +172,7 @@ impl Format {
             Self::Ply => &ply::DEF,
             Self::Off => &off::DEF,
             Self::Vtu => &vtu::DEF,
+            Self::Vtp => &vtu::DEF_POLYGONAL,
             Self::Inp => &inp::DEF,
             Self::Msh => &msh::DEF,
             Self::Msh22 => &msh::DEF_22,

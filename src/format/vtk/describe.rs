@@ -31,6 +31,27 @@ impl DataSet {
         set
     }
 
+    /// Moves the first `count` cells, with what they carry, behind all others.
+    pub(in super::super) fn rotate_cells(&mut self, count: usize) {
+        let cells = self.types.len();
+        let corners = count.checked_sub(1).map_or(0, |last| self.ends[last]);
+        let mut sizes: Vec<usize> =
+            std::iter::once(0).chain(self.ends.iter().copied()).zip(&self.ends).map(|(from, to)| to - from).collect();
+        sizes.rotate_left(count);
+        self.types.rotate_left(count);
+        self.connectivity.rotate_left(corners);
+        self.ends = sizes
+            .iter()
+            .scan(0, |end, size| {
+                *end += size;
+                Some(*end)
+            })
+            .collect();
+        for array in &mut self.cell_arrays {
+            array.values.rotate_left(count * (array.values.len() / cells.max(1)));
+        }
+    }
+
     fn add(&mut self, kind: u8, points: impl Iterator<Item = u32>) {
         self.types.push(kind);
         self.connectivity.extend(points);

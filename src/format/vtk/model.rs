@@ -44,6 +44,15 @@ impl Values {
         }
     }
 
+    /// Moves the first `count` numbers to the end.
+    pub(in super::super) fn rotate_left(&mut self, count: usize) {
+        match self {
+            Self::Bytes(v) => v.rotate_left(count),
+            Self::Int(v) => v.rotate_left(count),
+            Self::Float(v) => v.rotate_left(count),
+        }
+    }
+
     /// Appends the numbers of `other`; integers and floats together are floats.
     pub(in super::super) fn append(&mut self, other: Self) {
         match (&mut *self, other) {

@@ -8,6 +8,8 @@
 //! of heads, several pieces, and all cell types: first and second order triangles and quads, polygons, strips and
 //! pixels are faces, lines are members of edge groups, volumes are left out.
 //!
+//! A `.vtp` file has its lines before its faces, as the format orders them, and no quadratic cells, which it lacks.
+//!
 //! Writing gives one piece of 64-bit integers and floats, little-endian: as inline base64 in zlib blocks, which every
 //! XML reader takes, or where binary is asked for, as raw appended data, which is written and read fastest. The same
 //! mesh gives the same bytes. With second-order elements, cells are quadratic.
@@ -33,12 +35,30 @@ use crate::watch::Watch;
 use data::{Appended, Encoding, Packing};
 
 pub(super) const DEF: FormatDef =
-    FormatDef { name: "vtu", title: "VTK XML", endings: &["vtu", "vtp"], sniff, read, write: write::write };
+    FormatDef { name: "vtu", title: "VTK XML", endings: &["vtu"], sniff: is_grid, read, write: write::grid };
+
+pub(super) const DEF_POLYGONAL: FormatDef = FormatDef {
+    name: "vtp",
+    title: "VTK XML polygonal data",
+    endings: &["vtp"],
+    sniff: is_polygonal,
+    read,
+    write: write::polygonal,
+};
 
 const MOST_NODES: u32 = 1 << 16;
 
-fn sniff(bytes: &[u8]) -> bool {
-    bytes[..bytes.len().min(512)].windows(8).any(|w| w == b"<VTKFile")
+fn is_grid(bytes: &[u8]) -> bool {
+    begins_with(bytes, b"<VTKFile") && !is_polygonal(bytes)
+}
+
+fn is_polygonal(bytes: &[u8]) -> bool {
+    begins_with(bytes, b"<VTKFile") && begins_with(bytes, b"PolyData")
+}
+
+/// Whether the head of the file has this word.
+fn begins_with(bytes: &[u8], word: &[u8]) -> bool {
+    bytes[..bytes.len().min(512)].windows(word.len()).any(|w| w == word)
 }
 
 fn read(bytes: &[u8], watch: &Watch) -> Result<(Soup, ReadCounts), FormatError> {

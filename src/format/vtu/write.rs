@@ -1,6 +1,7 @@
-//! Writes `.vtu`: one piece of an unstructured grid.
+//! Writes `.vtu` and `.vtp`: one piece of an unstructured grid, or of polygonal data.
 
 use std::io::Write;
+use std::ops::Range;
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -11,7 +12,7 @@ use rayon::prelude::*;
 use super::super::element::elevate_for;
 use super::super::error::FormatError;
 use super::super::vtk::model::{Array, DataSet, Values};
-use super::super::{WriteOptions, error};
+use super::super::{Element, WriteOptions, error};
 use crate::mesh::Soup;
 
 /// The bytes of a block that is packed on its own.
@@ -19,13 +20,34 @@ const BLOCK: usize = 1 << 20;
 /// Packing harder costs several times the time for a tenth of the size.
 const LEVEL: u32 = 1;
 
-/// Writes `soup`.
-pub(super) fn write(soup: &Soup, options: &WriteOptions<'_>) -> Result<Vec<u8>, FormatError> {
+/// Writes `soup` as an unstructured grid.
+pub(super) fn grid(soup: &Soup, options: &WriteOptions<'_>) -> Result<Vec<u8>, FormatError> {
     let elevated = elevate_for(soup, options);
     let set = DataSet::of(soup, elevated.as_ref());
-    let mut file = File { out: Vec::new(), raw: options.binary, appended: Vec::new() };
-    file.grid(&set, &options.header)?;
-    Ok(file.out)
+    let cells = [CellList { element: "Cells", range: 0..set.types.len() }];
+    File::new(options).data_set("UnstructuredGrid", &set, &cells, &options.header)
+}
+
+/// Writes `soup` as polygonal data: lines, then faces.
+pub(super) fn polygonal(soup: &Soup, options: &WriteOptions<'_>) -> Result<Vec<u8>, FormatError> {
+    if options.element.is_some_and(Element::is_quadratic) {
+        let reason = error::Reason::Unsupported("polygonal data with second-order elements".into());
+        return Err(
+            FormatError::new(error::Place::File, reason).with_remedy("write a .vtu file, or first-order elements")
+        );
+    }
+    let mut set = DataSet::of(soup, None);
+    let lines = set.types.len() - soup.faces.len();
+    set.rotate_cells(soup.faces.len());
+    let cells =
+        [CellList { element: "Lines", range: 0..lines }, CellList { element: "Polys", range: lines..set.types.len() }];
+    File::new(options).data_set("PolyData", &set, &cells, &options.header)
+}
+
+/// Cells that stand in the file under one element.
+struct CellList {
+    element: &'static str,
+    range: Range<usize>,
 }
 
 /// The file as far as it is written.
@@ -37,32 +59,25 @@ struct File {
 }
 
 impl File {
-    fn grid(&mut self, set: &DataSet, header: &str) -> Result<(), FormatError> {
-        let compressor = if self.raw { "" } else { " compressor=\"vtkZLibDataCompressor\"" };
-        self.text("<?xml version=\"1.0\"?>\n");
-        if !header.is_empty() {
-            // Two hyphens would end the comment.
-            self.text(&format!("<!-- {} -->\n", header.replace("--", "- -")));
-        }
-        self.text(
-            "<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\"",
-        );
-        self.text(&format!("{compressor}>\n<UnstructuredGrid>\n"));
+    fn new(options: &WriteOptions<'_>) -> Self {
+        Self { out: Vec::new(), raw: options.binary, appended: Vec::new() }
+    }
+
+    fn data_set(mut self, kind: &str, set: &DataSet, cells: &[CellList], header: &str) -> Result<Vec<u8>, FormatError> {
+        self.open(kind, header);
         self.arrays("FieldData", &set.field_arrays, true)?;
-        let (points, cells) = (set.points.len(), set.types.len());
-        self.text(&format!("<Piece NumberOfPoints=\"{points}\" NumberOfCells=\"{cells}\">\n<Points>\n"));
+        let counts: String =
+            cells.iter().map(|list| format!(" NumberOf{}=\"{}\"", list.element, list.range.len())).collect();
+        self.text(&format!("<Piece NumberOfPoints=\"{}\"{counts}>\n<Points>\n", set.points.len()));
         let coordinates: &[f64] = bytemuck::cast_slice(&set.points);
         self.data("Points", "Float64", 3, None, bytemuck::cast_slice(coordinates))?;
-        self.text("</Points>\n<Cells>\n");
-        let connectivity: Vec<u8> = set.connectivity.iter().flat_map(|&p| i64::from(p).to_le_bytes()).collect();
-        self.data("connectivity", "Int64", 1, None, &connectivity)?;
-        let ends: Vec<u8> = set.ends.iter().flat_map(|&e| (e as i64).to_le_bytes()).collect();
-        self.data("offsets", "Int64", 1, None, &ends)?;
-        self.data("types", "UInt8", 1, None, &set.types)?;
-        self.text("</Cells>\n");
+        self.text("</Points>\n");
+        for list in cells {
+            self.cells(set, list)?;
+        }
         self.arrays("PointData", &set.point_arrays, false)?;
         self.arrays("CellData", &set.cell_arrays, false)?;
-        self.text("</Piece>\n</UnstructuredGrid>\n");
+        self.text(&format!("</Piece>\n</{kind}>\n"));
         if self.raw {
             self.text("<AppendedData encoding=\"raw\">\n_");
             let appended = std::mem::take(&mut self.appended);
@@ -70,6 +85,36 @@ impl File {
             self.text("\n</AppendedData>\n");
         }
         self.text("</VTKFile>\n");
+        Ok(self.out)
+    }
+
+    fn open(&mut self, kind: &str, header: &str) {
+        let compressor = if self.raw { "" } else { " compressor=\"vtkZLibDataCompressor\"" };
+        self.text("<?xml version=\"1.0\"?>\n");
+        if !header.is_empty() {
+            // Two hyphens would end the comment.
+            self.text(&format!("<!-- {} -->\n", header.replace("--", "- -")));
+        }
+        self.text(&format!(
+            "<VTKFile type=\"{kind}\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\""
+        ));
+        self.text(&format!("{compressor}>\n<{kind}>\n"));
+    }
+
+    fn cells(&mut self, set: &DataSet, list: &CellList) -> Result<(), FormatError> {
+        let CellList { element, range } = list;
+        let start = range.start.checked_sub(1).map_or(0, |before| set.ends[before]);
+        let ends = &set.ends[range.clone()];
+        let corners = &set.connectivity[start..ends.last().copied().unwrap_or(start)];
+        self.text(&format!("<{element}>\n"));
+        let connectivity: Vec<u8> = corners.iter().flat_map(|&p| i64::from(p).to_le_bytes()).collect();
+        self.data("connectivity", "Int64", 1, None, &connectivity)?;
+        let ends: Vec<u8> = ends.iter().flat_map(|&e| ((e - start) as i64).to_le_bytes()).collect();
+        self.data("offsets", "Int64", 1, None, &ends)?;
+        if *element == "Cells" {
+            self.data("types", "UInt8", 1, None, &set.types[range.clone()])?;
+        }
+        self.text(&format!("</{element}>\n"));
         Ok(())
     }
 
