@@ -116,6 +116,16 @@ fn turned_faces_are_turned_back() {
 }
 
 #[test]
+fn a_fin_that_goes_on_from_a_wall_does_not_open_the_box() {
+    // From the edge x = 1, z = 1 upward, in the plane of the wall x = 1, which is flatter than the corner to the lid.
+    let fin = soup(&[[1.0, 0.0, 1.0], [1.0, 1.0, 1.0], [1.0, 1.0, 1.5], [1.0, 0.0, 1.5]], &[[0, 1, 2], [0, 2, 3]]);
+    let (surface, stats) = run(&merged(cube([0.0; 3]), &fin));
+    assert_eq!((stats.components, stats.non_manifold_edges_cut), (2, 1));
+    assert_eq!(euler(&surface), (3, 4));
+    assert_eq!(surface.faces.len(), 14);
+}
+
+#[test]
 fn cubes_that_share_an_edge_come_apart() {
     let (surface, stats) = run(&merged(cube([0.0; 3]), &cube([1.0, 1.0, 0.0])));
     assert_eq!((stats.components, stats.non_manifold_edges_cut, stats.vertex_copies), (2, 1, 2));

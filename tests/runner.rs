@@ -21,7 +21,18 @@ use serde::{Deserialize, Serialize};
 
 const FILE: &[InputDef] = &[InputDef { name: "file", accepts: &[Port::File], required: true, doc: "numbers" }];
 const FROM: &[InputDef] = &[InputDef { name: "from", accepts: &[Port::Soup], required: true, doc: "a soup" }];
-const SOUP: &[OutputDef] = &[OutputDef { name: "main", port: OutPort::Is(Port::Soup) }];
+const SOUP: &[OutputDef] = &[
+    OutputDef { name: "main", port: OutPort::Is(Port::Soup), derive: None },
+    OutputDef { name: "twice", port: OutPort::Is(Port::Soup), derive: Some(twice) },
+];
+
+/// The main output twice as large.
+fn twice(main: &Artifact) -> Option<Artifact> {
+    let Artifact::Soup(soup) = main else { return None };
+    let mut soup = (**soup).clone();
+    soup.points.iter_mut().for_each(|point| *point *= 2.0);
+    Some(Artifact::Soup(Arc::new(soup)))
+}
 
 /// Nothing to choose.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -189,6 +200,22 @@ fn plan_of(folder: &Path, text: &str, set: &[(&str, &str)]) -> Plan {
     let context = Context { catalog: TOYS, check_file: &|_| Ok(()), endings: &["obj", "stl", "vtu"] };
     plan::plan(&recipe.unwrap_or_else(|problems| panic!("{problems}")), &context)
         .unwrap_or_else(|problems| panic!("{problems}"))
+}
+
+#[test]
+fn an_output_that_is_part_of_the_main_one_is_taken_from_it() {
+    let text = CHAIN.replace("[outputs]", "[outputs]\n\"scaled.twice\" = [\"twice.obj\"]");
+    let bench = Bench::new();
+    let (plan, outcome) = bench.run(&text, &[]);
+    let steps = &plan.cases()[0].steps;
+    assert_eq!(plan.inputs(steps["scaled.twice"]), [("main", steps["scaled"])]);
+    assert_eq!(outcome.task(steps["scaled.twice"]).state, TaskState::Done);
+    let written = fs::read_to_string(bench.path("out/twice.obj")).unwrap();
+    assert!(written.contains("v 6 0 0"), "{written}");
+    // Asked for alone, it still needs the main one.
+    let alone = text.replace("last = [", "# last = [").replace("rounded = [", "# rounded = [");
+    let (plan, _) = bench.run(&alone, &[("first", "4")]);
+    assert!(plan.cases()[0].steps.contains_key("scaled"));
 }
 
 /// The states of the steps, by name.

@@ -30,8 +30,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Fault> {
             .help(format!("use one of the endings {}", known.join(", "))));
     };
     let (soup, counts) = read_with_counts(&arguments.from)?;
-    let options =
-        WriteOptions { binary: !arguments.text, header: format!("meshmill {VERSION}"), ..WriteOptions::default() };
+    let binary = !arguments.text && format.is_binary_by_default();
+    let options = WriteOptions { binary, header: format!("meshmill {VERSION}"), ..WriteOptions::default() };
     let bytes = format::write(format, &soup, &options).map_err(|error| {
         let help = error.remedy.clone();
         Fault::new(Exit::Step, format!("cannot write {}: {error}", arguments.to.display())).help_opt(help)

@@ -197,6 +197,12 @@ impl Format {
         self.def().endings
     }
 
+    /// Whether a file is binary where nobody says otherwise: wherever the format has it, but for OFF, whose binary kind few
+    /// programs read.
+    pub fn is_binary_by_default(self) -> bool {
+        self != Self::Off
+    }
+
     /// The format with this name in recipes.
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.iter().copied().find(|f| f.name() == name)

@@ -86,6 +86,8 @@ pub fn find(name: &str) -> Option<&'static MetricDef> {
 pub const LOW_STRETCH: f64 = 0.2;
 /// Quads of a lower scaled Jacobian are called low.
 pub const LOW_SCALED_JACOBIAN: f64 = 0.2;
+/// Quads of a larger warp angle, in degrees, are called folded.
+pub const FOLDED: f64 = 30.0;
 
 const fn metric(
     name: &'static str,

@@ -14,6 +14,7 @@ use super::task::{GateTask, StepTask, TaskId};
 use super::wire::{Producer, Wiring, wire};
 use super::{Case, Column, Gate, Output, OutputOptions, Plan};
 use crate::recipe::{Diagnostic, Diagnostics, Recipe, Span, Value};
+use crate::step::OutputDef;
 
 /// Plans a recipe as it is.
 ///
@@ -94,6 +95,11 @@ struct Parts {
     result: Option<(String, Producer)>,
 }
 
+/// An input of a task, by its name.
+type Link = (&'static str, TaskId);
+/// The ending of an input that is a file, by its name.
+type Ending = (&'static str, String);
+
 /// The nodes of a case's outputs.
 struct Nodes<'a, 'r> {
     steps: &'a [BoundDecl<'r>],
@@ -129,19 +135,37 @@ impl<'a, 'r> Nodes<'a, 'r> {
         for &index in &wiring.order {
             for output in steps[index].def.outputs {
                 if used.contains(&(index, output.name)) {
-                    nodes.add_output(index, output.name, wiring, builder);
+                    nodes.add_output(index, output, wiring, builder);
                 }
             }
         }
         nodes
     }
 
-    fn add_output(&mut self, index: usize, output: &'static str, wiring: &Wiring, builder: &mut PlanBuilder) {
+    fn add_output(&mut self, index: usize, output: &OutputDef, wiring: &Wiring, builder: &mut PlanBuilder) {
         let step = &self.steps[index];
         let Some(bound) = &step.bound else { return };
+        if self.ids.contains_key(&(index, output.name)) {
+            return;
+        }
+        let (inputs, endings) = match (output.derive, step.def.outputs.first()) {
+            (Some(_), Some(main)) => {
+                self.add_output(index, main, wiring, builder);
+                (self.ids.get(&(index, main.name)).map(|id| (main.name, *id)).into_iter().collect(), Vec::new())
+            }
+            _ => self.inputs(index, wiring, builder),
+        };
+        let (bound, locks) = (Arc::clone(bound), step.locks.clone());
+        let task = StepTask { def: step.def, output: output.name, bound, locks, endings };
+        let id = builder.step(&label(&step.decl.name, output.name), task, &inputs);
+        self.ids.insert((index, output.name), id);
+    }
+
+    /// The inputs of a step by name, and the endings of those that are files.
+    fn inputs(&self, index: usize, wiring: &Wiring, builder: &mut PlanBuilder) -> (Vec<Link>, Vec<Ending>) {
         let mut inputs = Vec::new();
         let mut endings = Vec::new();
-        for (name, path) in &step.files {
+        for (name, path) in &self.steps[index].files {
             inputs.push((*name, builder.source(path)));
             let ending = path.extension().map(|ending| ending.to_string_lossy().to_lowercase()).unwrap_or_default();
             endings.push((*name, ending));
@@ -151,9 +175,7 @@ impl<'a, 'r> Nodes<'a, 'r> {
                 inputs.push((link.input, id));
             }
         }
-        let task = StepTask { def: step.def, output, bound: Arc::clone(bound), locks: step.locks.clone(), endings };
-        let id = builder.step(&label(&step.decl.name, output), task, &inputs);
-        self.ids.insert((index, output), id);
+        (inputs, endings)
     }
 
     fn id(&self, producer: Producer) -> Option<TaskId> {

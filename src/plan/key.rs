@@ -22,7 +22,7 @@ pub type Key = blake3::Hash;
 pub type ContentHash = blake3::Hash;
 
 /// Raised whenever an equal mesh may give another verdict of a gate.
-pub const GATE_REVISION: u32 = 3;
+pub const GATE_REVISION: u32 = 4;
 
 /// One value of a walk.
 #[derive(Clone, Copy, Debug)]

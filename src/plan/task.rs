@@ -5,7 +5,8 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use crate::metric::gate::Check;
-use crate::step::{BoundStep, Locks, StepDef};
+use crate::step::{BoundStep, Inputs, Locks, Produced, StepDef, StepFailure};
+use crate::watch::Watch;
 
 /// A task of a [`Plan`](super::Plan).
 pub type TaskId = petgraph::graph::NodeIndex<u32>;
@@ -41,6 +42,24 @@ pub struct StepTask {
     pub locks: Locks,
     /// The lower-case ending of each file input, since it decides how the bytes are read.
     pub endings: Vec<(&'static str, String)>,
+}
+
+impl StepTask {
+    /// Runs the step, or takes the output from the main one where it is a part of that.
+    ///
+    /// # Errors
+    /// Those of the step.
+    pub fn run(&self, inputs: &Inputs, watch: &Watch) -> Result<Produced<serde_json::Value>, StepFailure> {
+        let output = self.def.outputs.iter().find(|output| output.name == self.output);
+        let Some(derive) = output.and_then(|output| output.derive) else {
+            return self.bound.run(inputs, self.output, &self.locks, watch);
+        };
+        let main = self.def.outputs.first().and_then(|main| inputs.get(main.name));
+        let artifact = main.and_then(derive);
+        let artifact =
+            artifact.ok_or_else(|| StepFailure::failed(format!("the main output has no `{}`", self.output)))?;
+        Ok(Produced { artifact, stats: serde_json::Value::Null })
+    }
 }
 
 impl fmt::Debug for StepTask {

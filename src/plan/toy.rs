@@ -12,7 +12,7 @@ const SOUP: InputDef =
 const SURFACE: InputDef = InputDef { name: "from", accepts: &[Port::Surface], required: true, doc: "the surface" };
 const REFERENCE: InputDef =
     InputDef { name: "reference", accepts: &[Port::Surface], required: false, doc: "what tolerances refer to" };
-const MAIN_SURFACE: OutputDef = OutputDef { name: "main", port: OutPort::Is(Port::Surface) };
+const MAIN_SURFACE: OutputDef = OutputDef { name: "main", port: OutPort::Is(Port::Surface), derive: None };
 
 /// What the toys report: nothing.
 #[derive(Serialize, JsonSchema)]
@@ -80,18 +80,39 @@ fn ten() -> u32 {
     10
 }
 
-toy!(Read, NoParams, "read", &[FILE], &[OutputDef { name: "main", port: OutPort::Is(Port::Soup) }], false);
+toy!(
+    Read,
+    NoParams,
+    "read",
+    &[FILE],
+    &[OutputDef { name: "main", port: OutPort::Is(Port::Soup), derive: None }],
+    false
+);
 toy!(Repair, RepairParams, "repair", &[SOUP], &[MAIN_SURFACE], false);
 toy!(
     Smooth,
     SmoothParams,
     "smooth",
     &[SURFACE, REFERENCE],
-    &[MAIN_SURFACE, OutputDef { name: "coarse", port: OutPort::Is(Port::Surface) }],
+    &[MAIN_SURFACE, OutputDef { name: "coarse", port: OutPort::Is(Port::Surface), derive: None }],
     true
 );
-toy!(Select, NoParams, "select", &[SOUP], &[OutputDef { name: "main", port: OutPort::SameAsFrom }], false);
-toy!(Measure, NoParams, "measure", &[SOUP], &[OutputDef { name: "main", port: OutPort::Is(Port::Metrics) }], false);
+toy!(
+    Select,
+    NoParams,
+    "select",
+    &[SOUP],
+    &[OutputDef { name: "main", port: OutPort::SameAsFrom, derive: None }],
+    false
+);
+toy!(
+    Measure,
+    NoParams,
+    "measure",
+    &[SOUP],
+    &[OutputDef { name: "main", port: OutPort::Is(Port::Metrics), derive: None }],
+    false
+);
 
 /// The toy steps.
 pub(super) static CATALOG: &[StepDef] = &[

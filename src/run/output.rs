@@ -212,7 +212,7 @@ fn encode(
     let options = WriteOptions {
         element,
         midside: project.as_ref().map(|project| project as &(dyn Fn(DVec3) -> DVec3 + Sync)),
-        binary: options.binary.unwrap_or(true),
+        binary: options.binary.unwrap_or(format.is_binary_by_default()),
         precision: options.precision.map(|digits| digits as usize),
         first_id: options.first_id,
         header: header(content),

@@ -46,7 +46,12 @@ pub struct OutputDef {
     pub name: &'static str,
     /// What comes out: one port, or the main input's own port.
     pub port: OutPort,
+    /// Where it is a part of the main output: taken from that, so that the step runs once for both.
+    pub derive: Option<Derive>,
 }
+
+/// Takes an output from the main one; `None` where that is no artifact of the step.
+pub type Derive = fn(&Artifact) -> Option<Artifact>;
 
 /// What an output is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -152,7 +152,7 @@ impl StepContract for Step {
             doc: "the surface whose distribution of sizes is kept; default: `base`",
         },
     ];
-    const OUTPUTS: &'static [OutputDef] = &[OutputDef { name: "main", port: OutPort::Is(Port::Surface) }];
+    const OUTPUTS: &'static [OutputDef] = &[OutputDef { name: "main", port: OutPort::Is(Port::Surface), derive: None }];
     const CARRIES: &'static str =
         "Maps groups, regions, marks, pins and seams; takes fields from the nearest points of the finest mesh.";
     const EXAMPLE: &'static str = "use = \"adapt-density\"\nfrom = \"fe.hierarchy\"\nbase = \"50%\"\nshare = \"25%\"\n";

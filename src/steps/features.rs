@@ -230,10 +230,10 @@ pub struct Step;
 
 impl StepContract for Step {
     const NAME: &'static str = "features";
-    const REVISION: u32 = 4;
+    const REVISION: u32 = 5;
     const INPUTS: &'static [InputDef] =
         &[InputDef { name: "from", accepts: &[Port::Surface], required: true, doc: "the surface to mark" }];
-    const OUTPUTS: &'static [OutputDef] = &[OutputDef { name: "main", port: OutPort::Is(Port::Surface) }];
+    const OUTPUTS: &'static [OutputDef] = &[OutputDef { name: "main", port: OutPort::Is(Port::Surface), derive: None }];
     const CARRIES: &'static str = "everything; marks of an earlier run and the pins on them are replaced";
     const EXAMPLE: &'static str = "use = \"features\"\nfrom = \"clean\"\nangle = 30\n";
 

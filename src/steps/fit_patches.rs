@@ -195,8 +195,8 @@ impl StepContract for Step {
         },
     ];
     const OUTPUTS: &'static [OutputDef] = &[
-        OutputDef { name: "main", port: OutPort::Is(Port::Patches) },
-        OutputDef { name: "quads", port: OutPort::Is(Port::Quads) },
+        OutputDef { name: "main", port: OutPort::Is(Port::Patches), derive: None },
+        OutputDef { name: "quads", port: OutPort::Is(Port::Quads), derive: Some(tessellation) },
     ];
     const CARRIES: &'static str = "nothing; the tessellation's field `patch` tells the patch of each element";
     const EXAMPLE: &'static str =
@@ -207,18 +207,18 @@ impl StepContract for Step {
 
     fn run(
         inputs: &Inputs,
-        output: &str,
+        _output: &str,
         params: &FitPatchesParams,
         _locks: &Locks,
         watch: &Watch,
     ) -> Result<Produced<FitPatchesStats>, StepFailure> {
         let quads = inputs.require("from")?.as_quads()?;
         let (patches, stats) = fit_patches(inputs.surface("surface")?, quads, params, watch)?;
-        let artifact = if output == "quads" {
-            Artifact::Quads(Arc::new(Quads { mesh: patches.tessellation, cover: None }))
-        } else {
-            Artifact::Patches(Arc::new(patches))
-        };
-        Ok(Produced { artifact, stats })
+        Ok(Produced { artifact: Artifact::Patches(Arc::new(patches)), stats })
     }
+}
+
+fn tessellation(patches: &Artifact) -> Option<Artifact> {
+    let Artifact::Patches(patches) = patches else { return None };
+    Some(Artifact::Quads(Arc::new(Quads { mesh: patches.tessellation.clone(), cover: None })))
 }

@@ -74,7 +74,7 @@ pub struct Step;
 
 impl StepContract for Step {
     const NAME: &'static str = "measure";
-    const REVISION: u32 = 3;
+    const REVISION: u32 = 4;
     const INPUTS: &'static [InputDef] = &[
         InputDef {
             name: "from",
@@ -89,7 +89,7 @@ impl StepContract for Step {
             doc: "the mesh to compare with",
         },
     ];
-    const OUTPUTS: &'static [OutputDef] = &[OutputDef { name: "main", port: OutPort::Is(Port::Metrics) }];
+    const OUTPUTS: &'static [OutputDef] = &[OutputDef { name: "main", port: OutPort::Is(Port::Metrics), derive: None }];
     const CARRIES: &'static str = "The result is a table: nothing of the mesh is carried.";
     const EXAMPLE: &'static str = "use = \"measure\"\nfrom = \"clean\"\nreference = \"raw\"\n";
 

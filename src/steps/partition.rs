@@ -217,7 +217,7 @@ impl StepContract for Step {
     const REVISION: u32 = 1;
     const INPUTS: &'static [InputDef] =
         &[InputDef { name: "from", accepts: &[Port::Surface], required: true, doc: "the surface to cut into regions" }];
-    const OUTPUTS: &'static [OutputDef] = &[OutputDef { name: "main", port: OutPort::Is(Port::Surface) }];
+    const OUTPUTS: &'static [OutputDef] = &[OutputDef { name: "main", port: OutPort::Is(Port::Surface), derive: None }];
     const CARRIES: &'static str = "everything but curves; regions are replaced";
     const EXAMPLE: &'static str = "use = \"partition\"\nfrom = \"marked\"\nmax-angle = 45\n";
 

@@ -201,7 +201,7 @@ impl StepContract for Step {
     const REVISION: u32 = 1;
     const INPUTS: &'static [InputDef] =
         &[InputDef { name: "file", accepts: &[Port::File], required: true, doc: "the mesh file" }];
-    const OUTPUTS: &'static [OutputDef] = &[OutputDef { name: "main", port: OutPort::Is(Port::Soup) }];
+    const OUTPUTS: &'static [OutputDef] = &[OutputDef { name: "main", port: OutPort::Is(Port::Soup), derive: None }];
     const CARRIES: &'static str = "Takes groups, regions and fields from the file, as far as its format has them.";
     const EXAMPLE: &'static str = "use = \"read\"\nfile = \"=inputs.part\"\n";
 

@@ -152,7 +152,7 @@ impl StepContract for Step {
     const REVISION: u32 = 1;
     const INPUTS: &'static [InputDef] =
         &[InputDef { name: "from", accepts: &[Port::Surface], required: true, doc: "the surface to refine" }];
-    const OUTPUTS: &'static [OutputDef] = &[OutputDef { name: "main", port: OutPort::Is(Port::Surface) }];
+    const OUTPUTS: &'static [OutputDef] = &[OutputDef { name: "main", port: OutPort::Is(Port::Surface), derive: None }];
     const EDITS: bool = true;
     const CARRIES: &'static str = "groups, regions, marks and seams are inherited by the parts; a midpoint joins the \
         vertex groups of both its ends; vertex fields are linear, face fields as in the parent";

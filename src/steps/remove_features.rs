@@ -210,7 +210,7 @@ impl StepContract for Step {
         required: true,
         doc: "the surface, with the marks of `features`",
     }];
-    const OUTPUTS: &'static [OutputDef] = &[OutputDef { name: "main", port: OutPort::Is(Port::Surface) }];
+    const OUTPUTS: &'static [OutputDef] = &[OutputDef { name: "main", port: OutPort::Is(Port::Surface), derive: None }];
     const EDITS: bool = true;
     const CARRIES: &'static str = "everything; fills take groups and region from most of their rim and fields from the \
         nearest place; marks of rims that are smooth now are dropped";

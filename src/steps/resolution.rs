@@ -109,7 +109,7 @@ impl StepContract for Step {
         required: true,
         doc: "a hierarchy, such as `fe.hierarchy` of a simplification step `fe`",
     }];
-    const OUTPUTS: &'static [OutputDef] = &[OutputDef { name: "main", port: OutPort::Is(Port::Surface) }];
+    const OUTPUTS: &'static [OutputDef] = &[OutputDef { name: "main", port: OutPort::Is(Port::Surface), derive: None }];
     const CARRIES: &'static str =
         "Maps groups, regions, marks, pins and seams; takes fields from the nearest points of the finest mesh.";
     const EXAMPLE: &'static str = "use = \"resolution\"\nfrom = \"fe.hierarchy\"\nshare = \"25%\"\n";

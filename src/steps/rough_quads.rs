@@ -349,7 +349,7 @@ impl StepContract for Step {
         required: true,
         doc: "the surface to cut, finer than the elements",
     }];
-    const OUTPUTS: &'static [OutputDef] = &[OutputDef { name: "main", port: OutPort::Is(Port::Quads) }];
+    const OUTPUTS: &'static [OutputDef] = &[OutputDef { name: "main", port: OutPort::Is(Port::Quads), derive: None }];
     const CARRIES: &'static str = "regions are mapped, and face groups where they hold all faces of an element; rims and \
         borders of regions are marked, corners pinned; other groups, seams and fields are dropped";
     const EXAMPLE: &'static str = "use = \"rough-quads\"\nfrom = \"sheet\"\ninterval = \"25%\"\n";

@@ -206,7 +206,7 @@ impl StepContract for Step {
         required: true,
         doc: "the mesh to select on",
     }];
-    const OUTPUTS: &'static [OutputDef] = &[OutputDef { name: "main", port: OutPort::SameAsFrom }];
+    const OUTPUTS: &'static [OutputDef] = &[OutputDef { name: "main", port: OutPort::SameAsFrom, derive: None }];
     const CARRIES: &'static str = "everything, and the new group";
     const EXAMPLE: &'static str =
         "use = \"select\"\nfrom = \"clean\"\nname = \"top\"\nnormal = { direction = [0, 0, 1], angle = 30 }\n";

@@ -230,7 +230,7 @@ impl StepContract for Step {
         required: true,
         doc: "a surface with curves or regions",
     }];
-    const OUTPUTS: &'static [OutputDef] = &[OutputDef { name: "main", port: OutPort::Is(Port::Surface) }];
+    const OUTPUTS: &'static [OutputDef] = &[OutputDef { name: "main", port: OutPort::Is(Port::Surface), derive: None }];
     const CARRIES: &'static str = "groups, regions, marks, pins and seams are inherited by the parts; new vertices join \
         the vertex groups of both ends of their edge; vertex fields are linear, face fields as in the parent; curves \
         become marked edges";

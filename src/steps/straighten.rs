@@ -278,7 +278,7 @@ impl StepContract for Step {
     const REVISION: u32 = 1;
     const INPUTS: &'static [InputDef] =
         &[InputDef { name: "from", accepts: &[Port::Surface], required: true, doc: "a surface with regions" }];
-    const OUTPUTS: &'static [OutputDef] = &[OutputDef { name: "main", port: OutPort::Is(Port::Surface) }];
+    const OUTPUTS: &'static [OutputDef] = &[OutputDef { name: "main", port: OutPort::Is(Port::Surface), derive: None }];
     const CARRIES: &'static str = "everything; curves are replaced";
     const EXAMPLE: &'static str = "use = \"straighten\"\nfrom = \"parts\"\nrounds = 8\n";
 

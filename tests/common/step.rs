@@ -27,7 +27,10 @@ pub(crate) fn run_locked(
     let (parameters, locks) = (format!("{{ {parameters} }}"), format!("{{ {locks} }}"));
     let bound = (step(name).bind)(ValueDeserializer::parse(&parameters).unwrap()).unwrap();
     let locks = Locks::deserialize(ValueDeserializer::parse(&locks).unwrap()).unwrap();
-    let produced = bound.run(&Inputs::new(inputs.to_vec()), output, &locks, &Watch::silent())?;
+    let mut produced = bound.run(&Inputs::new(inputs.to_vec()), output, &locks, &Watch::silent())?;
+    if let Some(derive) = step(name).outputs.iter().find(|def| def.name == output).and_then(|def| def.derive) {
+        produced.artifact = derive(&produced.artifact).unwrap();
+    }
     check(&produced.artifact, &format!("{name} {parameters}"));
     Ok(produced)
 }

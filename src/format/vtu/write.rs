@@ -24,7 +24,7 @@ const LEVEL: u32 = 1;
 pub(super) fn grid(soup: &Soup, options: &WriteOptions<'_>) -> Result<Vec<u8>, FormatError> {
     let elevated = elevate_for(soup, options);
     let set = DataSet::of(soup, elevated.as_ref());
-    let cells = [CellList { element: "Cells", range: 0..set.types.len() }];
+    let cells = [CellList { element: CELLS, range: 0..set.types.len() }];
     File::new(options).data_set("UnstructuredGrid", &set, &cells, &options.header)
 }
 
@@ -43,6 +43,9 @@ pub(super) fn polygonal(soup: &Soup, options: &WriteOptions<'_>) -> Result<Vec<u
         [CellList { element: "Lines", range: 0..lines }, CellList { element: "Polys", range: lines..set.types.len() }];
     File::new(options).data_set("PolyData", &set, &cells, &options.header)
 }
+
+/// The element of cells of any type, which has an array of these too.
+const CELLS: &str = "Cells";
 
 /// Cells that stand in the file under one element.
 struct CellList {
@@ -66,9 +69,11 @@ impl File {
     fn data_set(mut self, kind: &str, set: &DataSet, cells: &[CellList], header: &str) -> Result<Vec<u8>, FormatError> {
         self.open(kind, header);
         self.arrays("FieldData", &set.field_arrays, true)?;
-        let counts: String =
-            cells.iter().map(|list| format!(" NumberOf{}=\"{}\"", list.element, list.range.len())).collect();
-        self.text(&format!("<Piece NumberOfPoints=\"{}\"{counts}>\n<Points>\n", set.points.len()));
+        self.text(&format!("<Piece NumberOfPoints=\"{}\"", set.points.len()));
+        for CellList { element, range } in cells {
+            self.text(&format!(" NumberOf{element}=\"{}\"", range.len()));
+        }
+        self.text(">\n<Points>\n");
         let coordinates: &[f64] = bytemuck::cast_slice(&set.points);
         self.data("Points", "Float64", 3, None, bytemuck::cast_slice(coordinates))?;
         self.text("</Points>\n");
@@ -111,7 +116,7 @@ impl File {
         self.data("connectivity", "Int64", 1, None, &connectivity)?;
         let ends: Vec<u8> = ends.iter().flat_map(|&e| ((e - start) as i64).to_le_bytes()).collect();
         self.data("offsets", "Int64", 1, None, &ends)?;
-        if *element == "Cells" {
+        if *element == CELLS {
             self.data("types", "UInt8", 1, None, &set.types[range.clone()])?;
         }
         self.text(&format!("</{element}>\n"));

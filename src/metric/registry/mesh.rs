@@ -16,6 +16,11 @@ fn side(s: &Subject<'_>) -> DVec3 {
     if bounds.is_empty() { DVec3::ZERO } else { bounds.max - bounds.min }
 }
 
+/// The volume, where there is an inside.
+pub(super) fn enclosed(s: &Subject<'_>) -> Option<f64> {
+    s.topology().is_closed().then(|| s.extent().volume)
+}
+
 fn share(part: usize, whole: usize) -> Option<f64> {
     (whole > 0).then(|| part as f64 / whole as f64)
 }
@@ -115,8 +120,8 @@ pub(super) static METRICS: &[MetricDef] = &[
         Volume,
         Neutral,
         Mesh,
-        "Signed volume against the origin; a quad is the mean of its two cuts.",
-        |s| number(Some(s.extent().volume)),
+        "Signed volume of a closed mesh; a quad is the mean of its two cuts.",
+        |s| number(enclosed(s)),
     ),
     metric("diagonal", Length, Neutral, Mesh, "Diagonal of the bounding box.", |s| {
         number(Some(s.extent().bounds.diagonal()))

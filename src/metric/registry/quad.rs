@@ -6,7 +6,7 @@ use super::super::summary::{count, finite_mean, max, mean, min, number, percenti
 use super::Direction::{Higher, Lower, Neutral};
 use super::Needs::Quads;
 use super::Unit::{Count, Degrees, Ratio, Share};
-use super::{LOW_SCALED_JACOBIAN, MetricDef, metric};
+use super::{FOLDED, LOW_SCALED_JACOBIAN, MetricDef, metric};
 
 fn with_quads(s: &Subject<'_>, figure: impl Fn(&Subject<'_>) -> usize) -> Option<Value> {
     if s.quads().faces.is_empty() { None } else { count(figure(s)) }
@@ -33,6 +33,9 @@ pub(super) static METRICS: &[MetricDef] = &[
     }),
     metric("low-scaled-jacobian-share", Share, Lower, Quads, "Share of quads of scaled Jacobian below 0.2.", |s| {
         number(share_below(&s.quads().column(|q| q.scaled_jacobian), LOW_SCALED_JACOBIAN))
+    }),
+    metric("folded-quad-share", Share, Lower, Quads, "Share of quads of a warp angle above 30 degrees.", |s| {
+        number(share_below(&s.quads().column(|q| -q.warp_angle), -FOLDED))
     }),
     metric("inverted-quads", Count, Lower, Quads, "Quads of scaled Jacobian 0 or less.", |s| {
         with_quads(s, |s| s.quads().shapes.iter().filter(|q| q.scaled_jacobian <= 0.0).count())

@@ -5,6 +5,7 @@ use super::super::summary::number;
 use super::Direction::{Higher, Lower};
 use super::Needs::Reference;
 use super::Unit::{Flag, Length, Share};
+use super::mesh::enclosed;
 use super::{MetricDef, flag, metric};
 use crate::mesh::Soup;
 
@@ -129,8 +130,8 @@ pub(super) static METRICS: &[MetricDef] = &[
     metric("area-drift", Share, Lower, Reference, "|area / area of the reference − 1|.", |s| {
         number(drift(s.extent().area, s.reference()?.extent().area))
     }),
-    metric("volume-drift", Share, Lower, Reference, "|volume / volume of the reference − 1|.", |s| {
-        number(drift(s.extent().volume, s.reference()?.extent().volume))
+    metric("volume-drift", Share, Lower, Reference, "|volume / volume of the reference − 1|, both closed.", |s| {
+        number(drift(enclosed(s)?, enclosed(s.reference()?)?))
     }),
     metric(
         "groups-kept",

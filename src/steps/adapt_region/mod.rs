@@ -215,7 +215,7 @@ impl StepContract for Step {
             doc: "a mesh, or the points of a CSV file, with the field that `field` names, such as the result of an analysis",
         },
     ];
-    const OUTPUTS: &'static [OutputDef] = &[OutputDef { name: "main", port: OutPort::Is(Port::Surface) }];
+    const OUTPUTS: &'static [OutputDef] = &[OutputDef { name: "main", port: OutPort::Is(Port::Surface), derive: None }];
     const CARRIES: &'static str =
         "Maps groups, regions, marks, pins and seams; takes fields from the nearest points of the finest mesh.";
     const EXAMPLE: &'static str = "use = \"adapt-region\"\nfrom = \"fe.hierarchy\"\nbase = \"10%\"\nratio = 0.5\n\

@@ -322,8 +322,8 @@ impl crate::step::Step for Step {
         },
     ];
     const OUTPUTS: &'static [OutputDef] = &[
-        OutputDef { name: "main", port: OutPort::Is(Port::Surface) },
-        OutputDef { name: "hierarchy", port: OutPort::Is(Port::Hierarchy) },
+        OutputDef { name: "main", port: OutPort::Is(Port::Surface), derive: None },
+        OutputDef { name: "hierarchy", port: OutPort::Is(Port::Hierarchy), derive: None },
     ];
     const EDITS: bool = true;
     const CARRIES: &'static str =

@@ -7,17 +7,18 @@
 
 use rustc_hash::FxHashSet;
 
-use super::check::{Check, Fault, mean_side, smaller};
+use super::check::{Check, Fault, Wish, mean_side, smaller};
+use super::flatten::flatten;
 use super::lack::lack;
 use super::reuse::{Attempt, signs, take_over};
-use super::rework::Rework;
+use super::rework::{Aim, Rework};
 use super::search::Search;
 use super::settle::settle;
 use super::{QMorphError, QMorphParams, QMorphStats, sizes};
 use crate::technique::clean_quads::{clean, finish};
 use crate::technique::front::advance;
 use crate::technique::ground::Ground;
-use crate::technique::isotropic::{Rules, pair_up, polish, remesh, tighten};
+use crate::technique::isotropic::{Rules, lower_sizes, pair_up, polish, remesh, tighten};
 use crate::technique::join::{join_along_paths, join_neighbours};
 use crate::technique::mixed::Mixed;
 use crate::watch::{Cancelled, Watch};
@@ -61,6 +62,7 @@ pub(super) fn morph(
         }
         best.stats.attempts = attempts;
     }
+    work.flatten(&mut best, rules)?;
     let Attempt { quads, mut stats, .. } = best;
     stats.distance = check.distance(&quads, watch)?;
     stats.triangles = quads.census().0;
@@ -68,12 +70,12 @@ pub(super) fn morph(
 }
 
 /// What all attempts share.
-struct Morpher<'a, 'g> {
-    ground: &'a Ground<'g>,
-    params: &'a QMorphParams,
-    check: &'a Check,
-    scale: f64,
-    watch: &'a Watch,
+pub(super) struct Morpher<'a, 'g> {
+    pub(super) ground: &'a Ground<'g>,
+    pub(super) params: &'a QMorphParams,
+    pub(super) check: &'a Check,
+    pub(super) scale: f64,
+    pub(super) watch: &'a Watch,
 }
 
 impl Morpher<'_, '_> {
@@ -86,21 +88,24 @@ impl Morpher<'_, '_> {
         begun: &mut Vec<Vec<u64>>,
     ) -> Result<Option<Attempt>, QMorphError> {
         let (ground, watch, most) = (self.ground, self.watch, self.params.attempts.max(1));
-        let mut mesh = ground.workshop().ok_or(QMorphError::NotManifold)?;
-        sizes::set(&mut mesh, ground.surface, self.params, self.scale).map_err(QMorphError::Size)?;
-        watch.phase("remeshing between the curves", None);
-        remesh(&mut mesh, ground, rules, watch)?;
+        let mut mesh = self.triangles(&[], rules)?;
         prepare(&mut mesh, ground, self.check, rules, watch)?;
         let signs = signs(&mesh, ground.region_count());
         if begun.contains(&signs) {
             return Ok(None);
         }
         begun.push(signs);
-        let first = self.attempt(mesh, None, rules, stats)?.ok_or(QMorphError::Empty)?;
+        let mut first = self.attempt(mesh, None, rules, stats)?.ok_or(QMorphError::Empty)?;
         if most == 1 || first.is_good() {
             return Ok(Some(first));
         }
-        let few = self.improve(self.reworked(first.clone(), rules)?, (2 * most).div_ceil(3), rules, stats, true)?;
+        let mut few = self.improve_pieces(first.clone(), rules, stats)?;
+        if !few.flaws.crossing.is_empty()
+            && let Some(other) = self.untangled(rules, stats)?
+        {
+            few = few.or(self.improve_pieces(other.clone(), rules, stats)?);
+            first = other;
+        }
         if few.is_fair() {
             return Ok(Some(few));
         }
@@ -109,10 +114,24 @@ impl Morpher<'_, '_> {
         if many.is_better_than(&first) {
             many = self.improve(self.reworked(many, rules)?, most.div_ceil(2), rules, stats, true)?;
         }
-        let attempts = few.stats.attempts + many.stats.attempts;
-        let mut best = if few.is_better_than(&many) { few } else { many };
-        best.stats.attempts = attempts;
-        Ok(Some(best))
+        Ok(Some(many.or(few)))
+    }
+
+    /// The better of an attempt and those that follow from it with poor places meshed anew.
+    fn improve_pieces(&self, first: Attempt, rules: Rules, stats: &QMorphStats) -> Result<Attempt, QMorphError> {
+        let most = (2 * self.params.attempts).div_ceil(3);
+        self.improve(self.reworked(first, rules)?, most, rules, stats, true)
+    }
+
+    /// Triangles of the sizes asked for, and smaller ones at some places.
+    pub(super) fn triangles(&self, places: &[Wish], rules: Rules) -> Result<Mixed, QMorphError> {
+        let (ground, watch) = (self.ground, self.watch);
+        watch.phase("remeshing between the curves", None);
+        let mut mesh = ground.workshop().ok_or(QMorphError::NotManifold)?;
+        sizes::set(&mut mesh, ground.surface, self.params, self.scale).map_err(QMorphError::Size)?;
+        lower_sizes(&mut mesh, places, rules.floor);
+        remesh(&mut mesh, ground, rules, watch)?;
+        Ok(mesh)
     }
 
     /// Lowers sizes where faces prove too far away or poor, as long as that helps, and runs the front there again, with
@@ -158,7 +177,8 @@ impl Morpher<'_, '_> {
     fn rework(&self, attempt: &mut Attempt, rules: Rules) -> Result<(), Cancelled> {
         self.watch.phase("meshing poor places anew", None);
         let drawn = FxHashSet::default();
-        let mut rework = Rework { ground: self.ground, check: self.check, rules, watch: self.watch, drawn };
+        let mut rework =
+            Rework { ground: self.ground, check: self.check, rules, watch: self.watch, aim: Aim::Sound, drawn };
         for _ in 0..REWORKS {
             let before = attempt.clone();
             let reworked = rework.run(&mut attempt.quads, &mut attempt.flaws, &attempt.awake)?;
@@ -177,6 +197,24 @@ impl Morpher<'_, '_> {
         Ok(())
     }
 
+    /// Makes folded quads flatter: by moving vertices, and where that is not enough, meshed anew in small pieces.
+    fn flatten(&self, attempt: &mut Attempt, rules: Rules) -> Result<(), Cancelled> {
+        let (ground, check, watch) = (self.ground, self.check, self.watch);
+        watch.phase("flattening folded quads", None);
+        let Attempt { quads, flaws, stats, awake, .. } = attempt;
+        *flaws = flatten(quads, ground, check, rules.tolerance, flaws, watch)?;
+        awake.fill(true);
+        let mut rework = Rework { ground, check, rules, watch, aim: Aim::Flat, drawn: FxHashSet::default() };
+        let reworked = rework.run(quads, flaws, awake)?;
+        if reworked > 0 {
+            stats.reworked += reworked;
+            quads.compact();
+            *flaws = check.flaws(quads, rules.tolerance, watch)?;
+            *flaws = flatten(quads, ground, check, rules.tolerance, flaws, watch)?;
+        }
+        Ok(())
+    }
+
     /// Moves vertices of an attempt nearer to the surface, in regions that it made, and judges what it came to.
     fn settle(&self, attempt: &mut Attempt, rules: Rules) -> Result<(), Cancelled> {
         let Attempt { quads, awake, .. } = attempt;
@@ -189,7 +227,7 @@ impl Morpher<'_, '_> {
 
     /// From triangles to settled quads; with what the attempt before left where nothing changed. `None` where nothing
     /// did.
-    fn attempt(
+    pub(super) fn attempt(
         &self,
         triangles: Mixed,
         earlier: Option<&Attempt>,
@@ -224,7 +262,13 @@ impl Morpher<'_, '_> {
 }
 
 /// Lowers sizes where the triangles are too far from the surface: what they miss, quads miss more.
-fn prepare(mesh: &mut Mixed, ground: &Ground<'_>, check: &Check, rules: Rules, watch: &Watch) -> Result<(), Cancelled> {
+pub(super) fn prepare(
+    mesh: &mut Mixed,
+    ground: &Ground<'_>,
+    check: &Check,
+    rules: Rules,
+    watch: &Watch,
+) -> Result<(), Cancelled> {
     let tolerance = TRIANGLES * rules.tolerance;
     let mut changed = vec![true; ground.region_count()];
     for _ in 0..PREPARATIONS {

@@ -2,6 +2,9 @@
 
 use std::collections::BTreeSet;
 
+use glam::DVec3;
+use smallvec::SmallVec;
+
 use crate::mesh::bvh::SegmentBvh;
 use crate::mesh::{Carried, FaceId, Freedom, Regions, Soup, VertexId, edge_key};
 use crate::technique::ground::Ground;
@@ -22,7 +25,7 @@ pub(super) fn leave(mesh: &Mixed, ground: &Ground<'_>) -> Soup {
     }
     carry_faces(mesh, ground, &mut carried);
     carry_edges(&soup, ground, &arcs, &mut carried);
-    carry_vertices(&soup, ground, &mut carried);
+    carry_vertices(&soup, &places, ground, &mut carried);
     soup.carried = carried;
     soup
 }
@@ -59,16 +62,61 @@ fn carry_edges(soup: &Soup, ground: &Ground<'_>, arcs: &[([VertexId; 2], u32)], 
     }
 }
 
-/// A vertex group goes to the nearest vertices.
-fn carry_vertices(soup: &Soup, ground: &Ground<'_>, carried: &mut Carried) {
+/// A vertex belongs to the groups of the whole face that it lies on, or of the whole edge where it lies on a curve: to those
+/// of all its corners. The vertices nearest to those of a group belong to it too, so that none is lost.
+fn carry_vertices(soup: &Soup, places: &[Place], ground: &Ground<'_>, carried: &mut Carried) {
     let groups = &ground.surface.carried.groups.vertices;
     if groups.is_empty() {
         return;
     }
     let tree = SegmentBvh::new(soup.points.iter().map(|&p| [p, p]).collect());
+    let under: Vec<SmallVec<[VertexId; 3]>> =
+        soup.points.iter().zip(places).map(|(&point, &place)| corners_under(ground, point, place)).collect();
     for (name, members) in groups {
         let nearest = |v: &VertexId| tree.closest(ground.surface.points[*v]).map(|c| VertexId::from_raw(c.index));
-        let list: BTreeSet<VertexId> = members.iter().filter_map(nearest).collect();
+        let mut list: BTreeSet<VertexId> = members.iter().filter_map(nearest).collect();
+        let within = |corners: &[VertexId]| corners.iter().all(|v| members.binary_search(v).is_ok());
+        let inside = under.iter().enumerate().filter(|(_, corners)| !corners.is_empty() && within(corners));
+        list.extend(inside.map(|(v, _)| VertexId::new(v)));
         carried.groups.vertices.insert(name.clone(), list.into_iter().collect());
+    }
+}
+
+/// The corners of what a vertex lies on: an edge of its curve, or a face. None for a node, which is nearest to itself.
+fn corners_under(ground: &Ground<'_>, point: DVec3, place: Place) -> SmallVec<[VertexId; 3]> {
+    match place {
+        Place::Node => SmallVec::new(),
+        Place::Arc { arc, at } => {
+            let curve = &ground.curves[arc as usize];
+            let i = curve.along.partition_point(|&s| s < at).clamp(1, curve.along.len() - 1);
+            SmallVec::from_slice(&[curve.vertices[i - 1], curve.vertices[i]])
+        }
+        Place::Region(region) => SmallVec::from_slice(&ground.surface.faces[ground.project(region, point).face]),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::rework::tests::{N, id, quads, square};
+    use super::*;
+
+    #[test]
+    fn a_vertex_belongs_to_the_groups_of_the_face_that_it_lies_on() {
+        let mut surface = square();
+        // The left half, and one corner alone.
+        let half = (0..=N).flat_map(|y| (0..=N / 2).map(move |x| id(x, y))).collect();
+        surface.carried.groups.vertices.insert("half".into(), half);
+        surface.carried.groups.vertices.insert("corner".into(), vec![id(N, N)]);
+        let ground = Ground::new(&surface);
+        // All but those of the rim lie a third of a face to the right.
+        let inner = (1..N).flat_map(|y| (1..N).map(move |x| id(x, y)));
+        let moved: Vec<_> = inner.map(|v| (v, surface.points[v] + DVec3::new(0.3, 0.2, 0.0))).collect();
+        let left = leave(&quads(&ground, &moved), &ground);
+        let groups = &left.carried.groups.vertices;
+        let is_left = |v: &VertexId| left.points[*v].x <= f64::from(N / 2);
+        assert!(left.points.ids().filter(is_left).all(|v| groups["half"].contains(&v)));
+        // The nearest ones to those at the half's border lie just beyond it.
+        assert!(groups["half"].iter().all(|v| left.points[*v].x < f64::from(N / 2) + 0.5));
+        assert_eq!(groups["corner"].len(), 1);
     }
 }

@@ -76,8 +76,7 @@ impl Check {
     pub(super) fn flaws(&self, mesh: &Mixed, tolerance: f64, watch: &Watch) -> Result<Flaws, Cancelled> {
         let all = vec![true; self.regions.iter().max().map_or(0, |&last| last as usize + 1)];
         let faults = self.beyond(mesh, tolerance, &all, watch)?;
-        let faces: Vec<u32> = mesh.faces().collect();
-        Ok(Flaws { faults, crossing: self.crossing(mesh, &faces, watch)? })
+        Ok(Flaws { faults, crossing: self.crossing_all(mesh, watch)? })
     }
 
     /// The flaws of some faces of one region, as they lie beside the others.
@@ -109,6 +108,11 @@ impl Check {
         let mut crossing = self.crossing(mesh, &faces_in(mesh, &area), watch)?;
         crossing.retain(|f| inside.contains(f));
         Ok(Flaws { faults, crossing })
+    }
+
+    /// Faces that others pass through, in order; none where the surface itself meets itself.
+    pub(super) fn crossing_all(&self, mesh: &Mixed, watch: &Watch) -> Result<Vec<u32>, Cancelled> {
+        self.crossing(mesh, &mesh.faces().collect::<Vec<_>>(), watch)
     }
 
     /// Those of these faces that pass through each other.

@@ -16,7 +16,9 @@
 //! The same is done with the finished quads: where they are too far away, single vertices are moved over the ridges and
 //! tips that a face cuts off (`settle`); where that is not enough, or shapes are poor, sizes are lowered there and the
 //! front runs again in the regions that changed (`attempts`, `search`), or in a small piece about the place, whose rim
-//! stays (`rework`, `patch`). The best that was reached is kept.
+//! stays (`rework`, `patch`). Where quads pass through each other even then, all begins again from triangles that do not
+//! fold up at the ends of limbs (`untangle`). The best that was reached is kept, and what is folded in it made flatter
+//! (`flatten`).
 //!
 //! # Invariants
 //! - Curves stay chains of edges between the same nodes, and nodes stay where they are; borders of regions that
@@ -34,6 +36,7 @@
 mod attempts;
 mod carry;
 mod check;
+mod flatten;
 mod lack;
 mod midpoint;
 mod patch;
@@ -42,6 +45,7 @@ mod rework;
 mod search;
 mod settle;
 mod sizes;
+mod untangle;
 
 use std::sync::Arc;
 
@@ -193,8 +197,8 @@ pub enum QMorphError {
     #[error("`{0}` must be positive, got {1}")]
     NotPositive(&'static str, f64),
     /// The size is too small for the limit.
-    #[error("about {0} faces would be made, and `max-faces` allows {1}")]
-    TooManyFaces(usize, usize),
+    #[error("about {0:.3e} faces would be made, and `max-faces` allows {1}")]
+    TooManyFaces(f64, usize),
     /// The surface is no oriented manifold.
     #[error("an edge has more than two faces, or two of the same direction")]
     NotManifold,
@@ -265,7 +269,7 @@ fn rules(surface: &Surface, params: &QMorphParams, diagonal: f64) -> Result<(Rul
     let area: f64 = surface.faces.ids().map(|f| crate::mesh::geometry::triangle_area(surface.corners(f))).sum();
     let faces = 2.5 * area / (least * least);
     if faces > params.max_faces as f64 {
-        return Err(QMorphError::TooManyFaces(faces as usize, params.max_faces));
+        return Err(QMorphError::TooManyFaces(faces, params.max_faces));
     }
     Ok((rules, least))
 }
@@ -298,16 +302,17 @@ pub struct Step;
 
 impl StepContract for Step {
     const NAME: &'static str = "q-morph";
-    const REVISION: u32 = 15;
+    const REVISION: u32 = 16;
     const INPUTS: &'static [InputDef] = &[InputDef {
         name: "from",
         accepts: &[Port::Surface],
         required: true,
         doc: "the surface, with marked curves where it has features",
     }];
-    const OUTPUTS: &'static [OutputDef] = &[OutputDef { name: "main", port: OutPort::Is(Port::Quads) }];
+    const OUTPUTS: &'static [OutputDef] = &[OutputDef { name: "main", port: OutPort::Is(Port::Quads), derive: None }];
     const CARRIES: &'static str = "face groups and regions go to the quads on them, edge groups and marks to the edges \
-        along their curves, vertex groups to the nearest vertex; seams and fields are dropped";
+        along their curves, vertex groups to the nearest vertices and those \
+        on faces and curve edges that are in them; seams and fields are dropped";
     const EXAMPLE: &'static str = "use = \"q-morph\"\nfrom = \"clean\"\nsize = \"5%\"\n";
 
     type Params = QMorphParams;

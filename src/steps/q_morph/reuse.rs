@@ -47,6 +47,14 @@ impl Attempt {
         self.flaws.faults.is_empty() && self.flaws.crossing.is_empty() && self.lack < FAIR
     }
 
+    /// This one or a better one, which counts the attempts of both.
+    pub(super) fn or(self, other: Self) -> Self {
+        let attempts = self.stats.attempts + other.stats.attempts;
+        let mut best = if other.is_better_than(&self) { other } else { self };
+        best.stats.attempts = attempts;
+        best
+    }
+
     /// Whether this one lacks less than another: as a whole, or else in the sum of its regions.
     pub(super) fn is_better_than(&self, other: &Self) -> bool {
         let sum = |attempt: &Self| attempt.by_region.iter().sum::<f64>();

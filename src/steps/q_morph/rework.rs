@@ -6,8 +6,10 @@
 use rustc_hash::FxHashSet;
 
 use super::check::{Check, Fault, Flaws};
-use super::lack::{CROSSING, excess, lack_of, shortfall};
+use super::flatten::{fold, unfold};
+use super::lack::{CROSSING, FAIR, excess, lack_of, shortfall};
 use super::patch::Patch;
+use super::settle::Settler;
 use crate::technique::ground::Ground;
 use crate::technique::isotropic::Rules;
 use crate::technique::mixed::Mixed;
@@ -30,9 +32,23 @@ pub(super) struct Rework<'a, 'g> {
     pub(super) check: &'a Check,
     pub(super) rules: Rules,
     pub(super) watch: &'a Watch,
+    /// What places are at fault for.
+    pub(super) aim: Aim,
     /// Patches that were drawn, by their sign and the part of the sizes: again, they would come out the same.
     pub(super) drawn: FxHashSet<(u64, u64)>,
 }
+
+/// What a rework is after.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Aim {
+    /// Shapes and distance.
+    Sound,
+    /// Quads that lie flat, as sound as they are.
+    Flat,
+}
+
+/// Quads that are folded by more than this are meshed anew, in radians: 35 degrees.
+const FOLDED: f64 = 0.6109;
 
 impl Rework<'_, '_> {
     /// Goes through the worst places in regions that are `awake`. Returns how many got better.
@@ -63,6 +79,11 @@ impl Rework<'_, '_> {
     fn places(&self, mesh: &Mixed, flaws: &Flaws, awake: &[bool]) -> Vec<(u32, bool)> {
         let wants = |f: u32| awake[mesh.region(f) as usize];
         let mut places: Vec<(f64, u32, bool)> = Vec::new();
+        if self.aim == Aim::Flat {
+            let folds = mesh.faces().map(|f| (fold(mesh, f, FOLDED), f, false));
+            places.extend(folds.filter(|&(fold, f, _)| fold > 0.0 && wants(f)));
+            return worst_first(places);
+        }
         for fault in flaws.faults.iter().filter(|fault| wants(fault.face)) {
             places.push((4.0 * excess(fault, self.rules.tolerance), fault.face, true));
         }
@@ -73,8 +94,26 @@ impl Rework<'_, '_> {
                 places.push((short, f, false));
             }
         }
-        places.sort_by(|x, y| y.0.total_cmp(&x.0).then(x.1.cmp(&y.1)).then(x.2.cmp(&y.2)));
-        places.into_iter().map(|(_, face, is_far)| (face, is_far)).collect()
+        worst_first(places)
+    }
+
+    /// How much some faces lack.
+    fn lack(&self, mesh: &Mixed, faces: &[u32], flaws: &Flaws) -> f64 {
+        let folds: f64 = match self.aim {
+            Aim::Sound => 0.0,
+            Aim::Flat => faces.iter().map(|&f| fold(mesh, f, FOLDED)).sum(),
+        };
+        lack_of(mesh, faces.iter().copied(), flaws, self.rules.tolerance) + folds
+    }
+
+    /// Quads for a patch, see [`Patch::remade`].
+    fn draw(&self, patch: &Patch, mesh: &Mixed, scale: f64) -> Result<Option<Mixed>, Cancelled> {
+        let Some(mut remade) = patch.remade(mesh, self.ground, self.rules, scale, self.watch)? else { return Ok(None) };
+        if self.aim == Aim::Flat {
+            let Rework { ground, check, rules, watch, .. } = *self;
+            unfold(&mut Settler { mesh: &mut remade, ground, check, tolerance: rules.tolerance }, watch)?;
+        }
+        Ok(Some(remade))
     }
 
     /// Draws anew about a face until one draw is better. Whether one was.
@@ -84,7 +123,7 @@ impl Rework<'_, '_> {
         for &(rings, scale) in draws {
             let Some(patch) = Patch::around(mesh, face, rings) else { continue };
             let before = within(flaws, &patch);
-            let lacked = lack_of(mesh, patch.faces.iter().copied(), &before, tolerance);
+            let lacked = self.lack(mesh, &patch.faces, &before);
             if lacked == 0.0 {
                 return Ok(false);
             }
@@ -92,15 +131,18 @@ impl Rework<'_, '_> {
                 continue;
             }
             let enough = (1.0 - GAIN) * lacked;
-            let Some(remade) = patch.remade(mesh, self.ground, self.rules, scale, self.watch)? else { continue };
-            if lack_of(&remade, remade.faces(), &Flaws::default(), tolerance) >= enough {
+            let sound = poorest(mesh, &patch.faces).min(FAIR);
+            let Some(remade) = self.draw(&patch, mesh, scale)? else { continue };
+            if self.lack(&remade, &remade.faces().collect::<Vec<_>>(), &Flaws::default()) >= enough {
                 continue;
             }
             mesh.begin();
             if let Some(made) = patch.put_back(mesh, &remade) {
                 let after = self.check.flaws_near(mesh, tolerance, &made, self.watch)?;
                 let crosses = after.crossing.len() > before.crossing.len();
-                if !crosses && lack_of(mesh, made.iter().copied(), &after, tolerance) < enough {
+                let spoils =
+                    self.aim == Aim::Flat && (after.faults.len() > before.faults.len() || poorest(mesh, &made) < sound);
+                if !crosses && !spoils && self.lack(mesh, &made, &after) < enough {
                     mesh.commit();
                     flaws.faults.retain(|fault| !patch.faces.contains(&fault.face));
                     flaws.faults.extend(after.faults);
@@ -115,6 +157,17 @@ impl Rework<'_, '_> {
     }
 }
 
+/// The least quality of some faces.
+fn poorest(mesh: &Mixed, faces: &[u32]) -> f64 {
+    faces.iter().map(|&f| mesh.quality(f)).fold(f64::INFINITY, f64::min)
+}
+
+/// Faces in the order of what they lack.
+fn worst_first(mut places: Vec<(f64, u32, bool)>) -> Vec<(u32, bool)> {
+    places.sort_by(|x, y| y.0.total_cmp(&x.0).then(x.1.cmp(&y.1)).then(x.2.cmp(&y.2)));
+    places.into_iter().map(|(_, face, is_far)| (face, is_far)).collect()
+}
+
 /// The flaws of a patch's faces.
 fn within(flaws: &Flaws, patch: &Patch) -> Flaws {
     let is_inside = |f: u32| patch.faces.contains(&f);
@@ -123,16 +176,16 @@ fn within(flaws: &Flaws, patch: &Patch) -> Flaws {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use glam::{DVec3, dvec3};
 
     use super::*;
     use crate::mesh::{Facet, Soup, Surface, VertexId};
     use crate::technique::mixed::{NONE, Place};
 
-    const N: u32 = 10;
+    pub(in super::super) const N: u32 = 10;
 
-    fn id(x: u32, y: u32) -> VertexId {
+    pub(in super::super) fn id(x: u32, y: u32) -> VertexId {
         VertexId::from_raw(y * (N + 1) + x)
     }
 
@@ -146,14 +199,14 @@ mod tests {
     }
 
     /// A square of triangles.
-    fn square() -> Surface {
+    pub(in super::super) fn square() -> Surface {
         let faces: Vec<_> = cells().flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
         Surface { points: points().into(), faces: faces.into(), ..Surface::default() }
     }
 
     /// The same square of quads, with some vertices elsewhere.
-    fn quads(ground: &Ground<'_>, moved: &[(VertexId, DVec3)]) -> Mixed {
-        let mut points = points();
+    pub(in super::super) fn quads(ground: &Ground<'_>, moved: &[(VertexId, DVec3)]) -> Mixed {
+        let mut points = ground.surface.points.as_slice().to_vec();
         for &(v, to) in moved {
             points[v.index()] = to;
         }
@@ -167,7 +220,7 @@ mod tests {
         mesh
     }
 
-    fn rules() -> Rules {
+    pub(in super::super) fn rules() -> Rules {
         Rules { tolerance: 0.1, curve_tolerance: 0.05, shortest: 0.0, least_size: 0.25, floor: 0.1, gradation: 0.3 }
     }
 
@@ -176,7 +229,9 @@ mod tests {
         let check = Check::new(ground, &watch).unwrap();
         let mut flaws = check.flaws(mesh, rules().tolerance, &watch).unwrap();
         let drawn = FxHashSet::default();
-        Rework { ground, check: &check, rules: rules(), watch: &watch, drawn }.run(mesh, &mut flaws, &[true]).unwrap()
+        Rework { ground, check: &check, rules: rules(), watch: &watch, aim: Aim::Sound, drawn }
+            .run(mesh, &mut flaws, &[true])
+            .unwrap()
     }
 
     #[test]

@@ -54,11 +54,12 @@ pub(super) fn settle(
     Ok(())
 }
 
-struct Settler<'a, 'g> {
-    mesh: &'a mut Mixed,
-    ground: &'a Ground<'g>,
-    check: &'a Check,
-    tolerance: f64,
+/// Moves of single vertices that mind the distance.
+pub(super) struct Settler<'a, 'g> {
+    pub(super) mesh: &'a mut Mixed,
+    pub(super) ground: &'a Ground<'g>,
+    pub(super) check: &'a Check,
+    pub(super) tolerance: f64,
 }
 
 impl Settler<'_, '_> {
@@ -117,7 +118,7 @@ impl Settler<'_, '_> {
     }
 
     /// The surface's points in the box of a star, spread thin where there are many.
-    fn points_near(&self, v: u32) -> Vec<DVec3> {
+    pub(super) fn points_near(&self, v: u32) -> Vec<DVec3> {
         let mut area = Aabb::of([self.mesh.point(v)]);
         for f in self.mesh.faces_at(v) {
             for h in self.mesh.sides(f) {
@@ -150,7 +151,7 @@ impl Settler<'_, '_> {
 
     /// The sum of squares of what distances exceed the calm part of the tolerance by, both ways, at samples; once it is at
     /// least `bound`, anything above.
-    fn excess(&self, v: u32, points: &[DVec3], bound: f64) -> f64 {
+    pub(super) fn excess(&self, v: u32, points: &[DVec3], bound: f64) -> f64 {
         let triangles = self.triangles_at(v);
         let calm = CALM * self.tolerance;
         let over = |squared: f64| (squared.sqrt() - calm).max(0.0).powi(2);

@@ -296,14 +296,14 @@ pub struct Step;
 
 impl crate::step::Step for Step {
     const NAME: &'static str = "repair";
-    const REVISION: u32 = 2;
+    const REVISION: u32 = 3;
     const INPUTS: &'static [InputDef] = &[InputDef {
         name: "from",
         accepts: &[Port::Soup, Port::Surface],
         required: true,
         doc: "the mesh to repair, as read",
     }];
-    const OUTPUTS: &'static [OutputDef] = &[OutputDef { name: "main", port: OutPort::Is(Port::Surface) }];
+    const OUTPUTS: &'static [OutputDef] = &[OutputDef { name: "main", port: OutPort::Is(Port::Surface), derive: None }];
     const CARRIES: &'static str = "groups, regions, marks and fields follow their elements; faces that fill holes are \
         in the face group `filled`, and take region and values from the rim; seams are made anew";
     const EXAMPLE: &'static str = "use = \"repair\"\nfrom = \"raw\"\nfill-holes = \"all\"\n";

@@ -11,7 +11,7 @@ use super::adjacency::{EdgeTable, Twins, apex, face_of, tail};
 use super::draft::{Draft, normal};
 use super::orient::{orient, turn};
 use crate::mesh::id::Face;
-use crate::mesh::{HalfedgeId, IdVec, VertexId};
+use crate::mesh::{FaceId, HalfedgeId, IdVec, VertexId};
 
 /// A non-manifold edge before it is cut.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -25,8 +25,9 @@ pub(super) struct CutEdge {
 /// Joins the faces at every edge in pairs. An odd face out becomes a border.
 ///
 /// Where the faces alternate in direction round the edge, solids touch there, and each pair encloses material, so
-/// that the solids come apart. Elsewhere sheets meet, and the flattest pairs go on into each other: of three plates
-/// the straight two.
+/// that the solids come apart. Elsewhere sheets meet. The faces of a part that has no open edge stay together, so that a
+/// fin which goes on flat from the wall of a box does not open the box; then the flattest pairs go on into each other: of
+/// three plates the straight two.
 pub(super) fn pair_faces(draft: &mut Draft, table: &EdgeTable) -> (Twins, Vec<CutEdge>) {
     let mut twins = table.twins();
     let is_cut = |group: &[(VertexId, HalfedgeId)]| group.len() > 2;
@@ -35,11 +36,13 @@ pub(super) fn pair_faces(draft: &mut Draft, table: &EdgeTable) -> (Twins, Vec<Cu
     }
     // Directions only mean something once each smooth part agrees with itself and closed parts look outward.
     let parts = orient(draft, &mut twins).component;
-    turn_closed_parts_outward(draft, &mut twins, &parts);
+    let open = open_parts(draft, &parts);
+    turn_closed_parts_outward(draft, &mut twins, &parts, &open);
+    let closed = |f: FaceId| Some(parts[f]).filter(|&part| !open[part as usize]);
     let table = EdgeTable::new(&draft.faces, draft.points.len());
     let mut cut = Vec::new();
     for (a, b, group) in table.edges().filter(|(_, _, group)| is_cut(group)) {
-        let spokes = spokes(draft, a, b, group);
+        let spokes = spokes(draft, a, b, group, &closed);
         for (h, g) in pair_alternating(&spokes).unwrap_or_else(|| pair_flattest(&spokes)) {
             twins[h] = g;
             twins[g] = h;
@@ -49,11 +52,10 @@ pub(super) fn pair_faces(draft: &mut Draft, table: &EdgeTable) -> (Twins, Vec<Cu
     (twins, cut)
 }
 
-/// Parts without open edges of their own whose volume is negative are turned round.
-fn turn_closed_parts_outward(draft: &mut Draft, twins: &mut Twins, parts: &IdVec<Face, u32>) {
+/// Whether each part has edges where the number of its own faces is odd.
+fn open_parts(draft: &Draft, parts: &IdVec<Face, u32>) -> Vec<bool> {
     let count = parts.iter().max().map_or(0, |&last| last as usize + 1);
     let mut open = vec![false; count];
-    let mut volume = vec![0.0; count];
     let table = EdgeTable::new(&draft.faces, draft.points.len());
     for (_, _, group) in table.edges() {
         for (_, h) in group {
@@ -62,6 +64,12 @@ fn turn_closed_parts_outward(draft: &mut Draft, twins: &mut Twins, parts: &IdVec
             open[part as usize] |= own % 2 == 1;
         }
     }
+    open
+}
+
+/// Parts without open edges of their own whose volume is negative are turned round.
+fn turn_closed_parts_outward(draft: &mut Draft, twins: &mut Twins, parts: &IdVec<Face, u32>, open: &[bool]) {
+    let mut volume = vec![0.0; open.len()];
     let middle = draft.faces.iter().next().map_or(DVec3::ZERO, |corners| draft.points[corners[0]]);
     for (face, &part) in parts.enumerate() {
         let [a, b, c] = draft.corners(face).map(|p| p - middle);
@@ -83,10 +91,18 @@ struct Spoke {
     forward: bool,
     /// Whether it has an area at all.
     solid: bool,
+    /// Its part, where that has no open edge.
+    closed: Option<u32>,
 }
 
 /// The faces at an edge in the order of their angles.
-fn spokes(draft: &Draft, a: VertexId, b: VertexId, group: &[(VertexId, HalfedgeId)]) -> Vec<Spoke> {
+fn spokes(
+    draft: &Draft,
+    a: VertexId,
+    b: VertexId,
+    group: &[(VertexId, HalfedgeId)],
+    closed: &dyn Fn(FaceId) -> Option<u32>,
+) -> Vec<Spoke> {
     let along = (draft.points[b] - draft.points[a]).normalize_or_zero();
     let away = |h: HalfedgeId| (draft.points[apex(&draft.faces, h)] - draft.points[a]).reject_from_normalized(along);
     let reference = along.any_orthonormal_vector();
@@ -98,7 +114,7 @@ fn spokes(draft: &Draft, a: VertexId, b: VertexId, group: &[(VertexId, HalfedgeI
             let angle = libm::atan2(away.dot(across), away.dot(reference)) + PI;
             let forward = tail(&draft.faces, h) == a;
             let solid = normal(draft.corners(face_of(h))).length_squared() > 0.0;
-            Spoke { halfedge: h, angle, forward, solid }
+            Spoke { halfedge: h, angle, forward, solid, closed: closed(face_of(h)) }
         })
         .collect();
     spokes.sort_by(|s, t| s.angle.total_cmp(&t.angle).then(s.halfedge.cmp(&t.halfedge)));
@@ -146,7 +162,7 @@ fn pair_alternating(spokes: &[Spoke]) -> Option<Vec<(HalfedgeId, HalfedgeId)>> {
 /// are equally flat: all the edges along a joint should be paired alike.
 const SAME_ANGLE: f64 = 1e-4;
 
-/// Pairs in the order of their flatness; of equally flat ones those that agree in direction come first.
+/// Pairs within closed parts, and within what is open, then others; each in the order of their flatness; of equally flat ones those that agree in direction come first.
 ///
 /// Where as many faces run forward as backward the directions are taken to be right, and every pair agrees: a pair
 /// that did not would turn part of a solid inside out.
@@ -157,8 +173,9 @@ fn pair_flattest(spokes: &[Spoke]) -> Vec<(HalfedgeId, HalfedgeId)> {
         for (j, t) in spokes.iter().enumerate().skip(i + 1) {
             let turn = (s.angle - t.angle).abs();
             let bend = PI - turn.min(TAU - turn);
-            let rank = (!(s.solid && t.solid), (bend / SAME_ANGLE).round() as u64, s.forward == t.forward);
-            if balanced && rank.2 {
+            let apart = s.closed != t.closed;
+            let rank = (!(s.solid && t.solid), apart, (bend / SAME_ANGLE).round() as u64, s.forward == t.forward);
+            if balanced && rank.3 {
                 continue;
             }
             candidates.push((rank, s.halfedge.min(t.halfedge), s.halfedge.max(t.halfedge), i, j));

@@ -473,7 +473,7 @@ impl crate::step::Step for Step {
             doc: "what the tolerance is measured against; default: `from`",
         },
     ];
-    const OUTPUTS: &'static [OutputDef] = &[OutputDef { name: "main", port: OutPort::Is(Port::Surface) }];
+    const OUTPUTS: &'static [OutputDef] = &[OutputDef { name: "main", port: OutPort::Is(Port::Surface), derive: None }];
     const EDITS: bool = true;
     const CARRIES: &'static str = "Maps groups, regions, marks, pins and seams; takes fields from the nearest points of \
         `from`; adds the vertex fields `fit-kind` and `fit-radius`.";

@@ -15,6 +15,7 @@ use super::Curves;
 use crate::mesh::bvh::SegmentBvh;
 use crate::mesh::geometry::{Aabb, closest_on_segment};
 use crate::mesh::id::{Edge, IdVec};
+use crate::mesh::topology::components;
 use crate::mesh::{EdgeId, MarkCause};
 
 /// Where a curve is looked at, as shares of each of its edges.
@@ -56,12 +57,16 @@ impl Curves<'_> {
         let rank = self.ranks(&marked, corner_angle);
         let segments: Vec<[DVec3; 2]> = marked.iter().map(|&e| self.ends(e)).collect();
         let tree = SegmentBvh::new(segments);
+        // A body that touches another one keeps its edges, wherever those of the other lie.
+        let parts = components(self.surface);
+        let part = |i: usize| self.edges.sides(marked[i]).first().map(|side| parts.of_face[side.face]);
         let mut order: Vec<usize> = (0..marked.len()).collect();
         order.sort_by_key(|&i| std::cmp::Reverse(rank[i]));
         let mut is_kept = vec![false; marked.len()];
         let mut dropped = 0;
         for chain in order.chunk_by(|&i, &j| rank[i] == rank[j]) {
-            let beats = |other: usize| is_kept[other] && rank[other] > rank[chain[0]];
+            let own = part(chain[0]);
+            let beats = |other: usize| is_kept[other] && rank[other] > rank[chain[0]] && part(other) == own;
             let meeting = |&i: &usize| {
                 let is_sharp = self.causes[marked[i]] == Some(MarkCause::Feature);
                 if is_sharp { self.meeting(marked[i], gap, &tree, &marked, beats) } else { Meeting::Apart }

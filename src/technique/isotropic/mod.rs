@@ -92,16 +92,24 @@ pub fn tighten(
     places: &[(DVec3, f64, f64)],
     watch: &Watch,
 ) -> Result<(), Cancelled> {
+    let before: Vec<f64> = (0..mesh.vertex_slots()).map(|v| mesh.size(v)).collect();
+    lower_sizes(mesh, places, rules.floor);
+    Remesher { surplus: Vec::new(), asleep: Vec::new(), mesh, ground, rules }.adapt(0, &before, watch)
+}
+
+/// Lowers the size about some places (a point, how far about it, the size), not below the `floor`.
+pub fn lower_sizes(mesh: &mut Mixed, places: &[(DVec3, f64, f64)], floor: f64) {
+    if places.is_empty() {
+        return;
+    }
     let all: Vec<u32> = mesh.vertices().collect();
     let tree = SegmentBvh::new(all.iter().map(|&v| [mesh.point(v); 2]).collect());
-    let before: Vec<f64> = (0..mesh.vertex_slots()).map(|v| mesh.size(v)).collect();
     for &(at, reach, size) in places {
         for i in tree.in_box(&Aabb::of([at]).grown(reach)) {
             let v = all[i as usize];
-            mesh.set_size(v, mesh.size(v).min(size.max(rules.floor)));
+            mesh.set_size(v, mesh.size(v).min(size.max(floor)));
         }
     }
-    Remesher { surplus: Vec::new(), asleep: Vec::new(), mesh, ground, rules }.adapt(0, &before, watch)
 }
 
 /// Remeshes a piece of a surface inside its rim, which stays as it is.

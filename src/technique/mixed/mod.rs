@@ -22,7 +22,7 @@ mod tests;
 use glam::DVec3;
 
 use journal::Journal;
-pub use shape::{corner_sine, quad_quality, triangle_quality};
+pub use shape::{corner_sine, quad_quality, triangle_quality, warp};
 
 /// No element.
 pub const NONE: u32 = u32::MAX;

@@ -5,6 +5,7 @@
 use glam::DVec3;
 
 use super::Mixed;
+use crate::mesh::geometry::angle;
 
 /// The sine of the corner at `b` between `a` and `c`, seen from `normal`: the corner's scaled Jacobian.
 #[inline]
@@ -32,6 +33,12 @@ pub fn quad_quality(p: [DVec3; 4]) -> f64 {
         least = least.min(sine);
     }
     least
+}
+
+/// By how much a quad is folded: the larger angle between the normals of opposite corners, in radians.
+pub fn warp(p: [DVec3; 4]) -> f64 {
+    let normal = |i: usize| (p[(i + 1) % 4] - p[i]).cross(p[(i + 3) % 4] - p[i]);
+    angle(normal(0), normal(2)).max(angle(normal(1), normal(3)))
 }
 
 /// The quality of a triangle: twice its area over its longest sides, 1 for the equilateral one.
@@ -79,6 +86,6 @@ impl Mixed {
         let at = self.point(self.origin(h));
         let to = self.point(self.target(h));
         let from = self.point(self.origin(self.prev(h)));
-        crate::mesh::geometry::angle(to - at, from - at)
+        angle(to - at, from - at)
     }
 }
