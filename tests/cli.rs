@@ -187,6 +187,13 @@ fn plan_tells_why_a_task_has_to_run() {
 }
 
 #[test]
+fn a_file_where_the_outputs_are_to_go_is_told_before_anything_runs() {
+    let desk = Desk::new();
+    let refused = desk.meshmill(&["run", "recipe.toml", "--out", "cube.obj"]).assert().failure();
+    refused.stderr(predicate::str::contains("this is a file").and(predicate::str::contains("name a folder")));
+}
+
+#[test]
 fn the_smaller_commands_answer() {
     let desk = Desk::new();
     desk.meshmill(&["check", "recipe.toml"]).assert().success();

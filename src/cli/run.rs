@@ -171,9 +171,17 @@ pub(super) fn options(
 ) -> Result<RunOptions, Fault> {
     let name = planned.recipe.name.clone();
     let jobs = jobs_of(jobs)?;
-    let out = out.map_or_else(|| Path::new("out").join(&name), Path::to_path_buf);
+    let out = folder(out.map_or_else(|| Path::new("out").join(&name), Path::to_path_buf))?;
     let cancelled = Arc::clone(&interrupt.cancelled);
     Ok(RunOptions { name, out, jobs, only: Vec::new(), force: Vec::new(), cancelled })
+}
+
+/// The folder of the outputs; nothing may be there, or a folder.
+pub(super) fn folder(out: PathBuf) -> Result<PathBuf, Fault> {
+    if out.exists() && !out.is_dir() {
+        return Err(Fault::usage(format!("--out {}: this is a file", out.display())).help("name a folder"));
+    }
+    Ok(out)
 }
 
 /// How many tasks run at once.

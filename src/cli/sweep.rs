@@ -7,7 +7,7 @@ use super::Global;
 use super::context::{Planned, RecipeArguments, list_files, open_store, pair, plan_cases};
 use super::exit::{Exit, Fault, data, say};
 use super::picture::{self, Pictures};
-use super::run::{jobs_of, traced, write_record};
+use super::run::{folder, jobs_of, traced, write_record};
 use super::signals::Interrupt;
 use super::unchanged::Unchanged;
 use super::{goal, progress, report};
@@ -128,7 +128,7 @@ fn options(arguments: &Arguments, recipe: &Recipe, interrupt: &Interrupt, what: 
     let usual = || Path::new("out").join(format!("{}-{what}", recipe.name));
     Ok(RunOptions {
         name: recipe.name.clone(),
-        out: arguments.out.clone().unwrap_or_else(usual),
+        out: folder(arguments.out.clone().unwrap_or_else(usual))?,
         jobs: jobs_of(arguments.jobs)?,
         only: Vec::new(),
         force: Vec::new(),

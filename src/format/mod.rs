@@ -238,7 +238,10 @@ pub fn read(format: Format, bytes: &[u8], watch: &Watch) -> ReadResult {
         let error = error.in_format(format);
         match Format::from_content(bytes) {
             Some(other) if other != format && error.reason != Reason::Cancelled => {
-                error.with_remedy(format!("the content looks like {}: read it as `{}`", other.title(), other.name()))
+                let (title, name) = (other.title(), other.name());
+                error.with_remedy(format!(
+                    "the content looks like {title}: name the file so, or give `format = \"{name}\"` to `read`"
+                ))
             }
             _ => error,
         }

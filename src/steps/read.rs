@@ -252,7 +252,10 @@ mod tests {
         let params = ReadParams { format: Some(Format::Obj), ..ReadParams::default() };
         assert!(run("part.stl", TRIANGLE, &params).is_ok());
         let failure = run("part.stl", TRIANGLE, &ReadParams::default()).expect_err("no STL");
-        assert_eq!(failure.help.as_deref(), Some("the content looks like OBJ: read it as `obj`"));
+        assert_eq!(
+            failure.help.as_deref(),
+            Some("the content looks like OBJ: name the file so, or give `format = \"obj\"` to `read`")
+        );
     }
 
     #[test]

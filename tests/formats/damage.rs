@@ -189,7 +189,7 @@ fn a_number_that_is_none_is_refused_with_its_place() {
 #[test]
 fn a_file_of_another_format_is_told_by_its_content() {
     let error = read(Format::Obj, b"OFF\n1 0 0\n0 0 0\n", &Watch::silent()).expect_err("no OBJ");
-    assert_eq!(error.remedy.as_deref(), Some("the content looks like OFF: read it as `off`"));
+    assert!(error.remedy.is_some_and(|remedy| remedy.starts_with("the content looks like OFF: name the file so")));
 }
 
 #[test]

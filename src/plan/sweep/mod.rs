@@ -234,7 +234,10 @@ impl<'a> Reader<'a> {
         for axis in dimensions.iter().flatten() {
             if axis.len().is_none() {
                 let message = format!("the range of `{}` does not say how many values it has", axis.name);
-                self.problem(Diagnostic::error(axis.span, message).help("give `count`, or sample with [sweep.sample]"));
+                self.problem(
+                    Diagnostic::error(axis.span, message)
+                        .help("give `count`, on the command line as in `1%..4%/5`, or sample with [sweep.sample]"),
+                );
             }
         }
         for dimension in dimensions {

@@ -14,6 +14,7 @@ use super::reuse::{Attempt, signs, take_over};
 use super::rework::{Aim, Rework};
 use super::search::Search;
 use super::settle::settle;
+use super::untangle::untangled;
 use super::{QMorphError, QMorphParams, QMorphStats, sizes};
 use crate::technique::clean_quads::{clean, finish};
 use crate::technique::front::advance;
@@ -70,12 +71,12 @@ pub(super) fn morph(
 }
 
 /// What all attempts share.
-pub(super) struct Morpher<'a, 'g> {
-    pub(super) ground: &'a Ground<'g>,
-    pub(super) params: &'a QMorphParams,
-    pub(super) check: &'a Check,
-    pub(super) scale: f64,
-    pub(super) watch: &'a Watch,
+struct Morpher<'a, 'g> {
+    ground: &'a Ground<'g>,
+    params: &'a QMorphParams,
+    check: &'a Check,
+    scale: f64,
+    watch: &'a Watch,
 }
 
 impl Morpher<'_, '_> {
@@ -101,7 +102,7 @@ impl Morpher<'_, '_> {
         }
         let mut few = self.improve_pieces(first.clone(), rules, stats)?;
         if !few.flaws.crossing.is_empty()
-            && let Some(other) = self.untangled(rules, stats)?
+            && let Some(other) = self.begin_untangled(rules, stats)?
         {
             few = few.or(self.improve_pieces(other.clone(), rules, stats)?);
             first = other;
@@ -123,8 +124,16 @@ impl Morpher<'_, '_> {
         self.improve(self.reworked(first, rules)?, most, rules, stats, true)
     }
 
+    /// An attempt from triangles that do not fold up.
+    fn begin_untangled(&self, rules: Rules, stats: &QMorphStats) -> Result<Option<Attempt>, QMorphError> {
+        let (ground, check, watch) = (self.ground, self.check, self.watch);
+        let mut mesh = untangled(ground, check, rules, watch, &|places| self.triangles(places, rules))?;
+        prepare(&mut mesh, ground, check, rules, watch)?;
+        Ok(self.attempt(mesh, None, rules, stats)?)
+    }
+
     /// Triangles of the sizes asked for, and smaller ones at some places.
-    pub(super) fn triangles(&self, places: &[Wish], rules: Rules) -> Result<Mixed, QMorphError> {
+    fn triangles(&self, places: &[Wish], rules: Rules) -> Result<Mixed, QMorphError> {
         let (ground, watch) = (self.ground, self.watch);
         watch.phase("remeshing between the curves", None);
         let mut mesh = ground.workshop().ok_or(QMorphError::NotManifold)?;
@@ -227,7 +236,7 @@ impl Morpher<'_, '_> {
 
     /// From triangles to settled quads; with what the attempt before left where nothing changed. `None` where nothing
     /// did.
-    pub(super) fn attempt(
+    fn attempt(
         &self,
         triangles: Mixed,
         earlier: Option<&Attempt>,
@@ -262,13 +271,7 @@ impl Morpher<'_, '_> {
 }
 
 /// Lowers sizes where the triangles are too far from the surface: what they miss, quads miss more.
-pub(super) fn prepare(
-    mesh: &mut Mixed,
-    ground: &Ground<'_>,
-    check: &Check,
-    rules: Rules,
-    watch: &Watch,
-) -> Result<(), Cancelled> {
+fn prepare(mesh: &mut Mixed, ground: &Ground<'_>, check: &Check, rules: Rules, watch: &Watch) -> Result<(), Cancelled> {
     let tolerance = TRIANGLES * rules.tolerance;
     let mut changed = vec![true; ground.region_count()];
     for _ in 0..PREPARATIONS {

@@ -5,13 +5,12 @@
 
 use glam::DVec3;
 
-use super::attempts::{Morpher, prepare};
-use super::check::{Wish, mean_side, mean_size};
-use super::reuse::Attempt;
-use super::{QMorphError, QMorphStats};
+use super::QMorphError;
+use super::check::{Check, Wish, mean_side, mean_size};
+use crate::technique::ground::Ground;
 use crate::technique::isotropic::Rules;
 use crate::technique::mixed::{Mixed, Place};
-use crate::watch::Cancelled;
+use crate::watch::{Cancelled, Watch};
 
 /// How often all begins with smaller sizes where triangles pass through each other.
 const UNTANGLINGS: usize = 5;
@@ -21,40 +20,52 @@ const FINER: f64 = 0.6;
 /// The part of the tolerance from which on a free vertex was left inside the body.
 const STRAY: f64 = 0.5;
 
-impl Morpher<'_, '_> {
-    /// An attempt from triangles that are smaller where such fold up, until none do.
-    pub(super) fn untangled(&self, rules: Rules, stats: &QMorphStats) -> Result<Option<Attempt>, QMorphError> {
-        let mut places: Vec<Wish> = Vec::new();
-        let mut best: Option<(usize, Mixed)> = None;
-        for _ in 0..UNTANGLINGS {
-            let mesh = self.triangles(&places, rules)?;
-            let found = self.folds(&mesh, rules)?;
-            let folded = found.len();
-            places.extend(found);
-            if best.as_ref().is_none_or(|(least, _)| folded < *least) {
-                best = Some((folded, mesh));
-            }
-            if folded == 0 {
-                break;
-            }
+/// Triangles that do not fold up, of those that `make` gives where sizes are lowered at some places; the least folded ones
+/// where all do.
+///
+/// # Errors
+/// Those of `make`, and where the run was interrupted.
+pub(super) fn untangled(
+    ground: &Ground<'_>,
+    check: &Check,
+    rules: Rules,
+    watch: &Watch,
+    make: &dyn Fn(&[Wish]) -> Result<Mixed, QMorphError>,
+) -> Result<Mixed, QMorphError> {
+    let mut best = make(&[])?;
+    let mut places = folds(&best, ground, check, rules, watch)?;
+    let mut least = places.len();
+    for _ in 1..UNTANGLINGS {
+        if least == 0 {
+            break;
         }
-        let Some((_, mut mesh)) = best else { return Ok(None) };
-        prepare(&mut mesh, self.ground, self.check, rules, self.watch)?;
-        Ok(self.attempt(mesh, None, rules, stats)?)
+        let mesh = make(&places)?;
+        let found = folds(&mesh, ground, check, rules, watch)?;
+        if found.len() < least {
+            (least, best) = (found.len(), mesh);
+        }
+        places.extend(found);
     }
+    Ok(best)
+}
 
-    /// Where triangles pass through each other, or a vertex was left inside the body: places that need smaller ones.
-    fn folds(&self, mesh: &Mixed, rules: Rules) -> Result<Vec<Wish>, Cancelled> {
-        let wish = |at: DVec3, side: f64| (at, ABOUT * side, FINER * side);
-        let crossing = self.check.crossing_all(mesh, self.watch)?;
-        let crossing = crossing.into_iter().map(|f| wish(mesh.centre(f), mean_side(mesh, f).min(mean_size(mesh, f))));
-        let strays = mesh.vertices().filter(|&v| {
-            let Place::Region(region) = mesh.place(v) else { return false };
-            let foot = self.ground.project_from(region, mesh.point(v), mesh.point(v));
-            foot.distance_squared > (STRAY * rules.tolerance).powi(2)
-        });
-        Ok(crossing.chain(strays.map(|v| wish(mesh.point(v), mesh.size(v)))).collect())
-    }
+/// Where triangles pass through each other, or a vertex was left inside the body: places that need smaller ones.
+fn folds(
+    mesh: &Mixed,
+    ground: &Ground<'_>,
+    check: &Check,
+    rules: Rules,
+    watch: &Watch,
+) -> Result<Vec<Wish>, Cancelled> {
+    let wish = |at: DVec3, side: f64| (at, ABOUT * side, FINER * side);
+    let crossing = check.crossing_all(mesh, watch)?;
+    let crossing = crossing.into_iter().map(|f| wish(mesh.centre(f), mean_side(mesh, f).min(mean_size(mesh, f))));
+    let strays = mesh.vertices().filter(|&v| {
+        let Place::Region(region) = mesh.place(v) else { return false };
+        let foot = ground.project_from(region, mesh.point(v), mesh.point(v));
+        foot.distance_squared > (STRAY * rules.tolerance).powi(2)
+    });
+    Ok(crossing.chain(strays.map(|v| wish(mesh.point(v), mesh.size(v)))).collect())
 }
 
 #[cfg(test)]
@@ -62,11 +73,7 @@ mod tests {
     use super::*;
     use crate::mesh::Surface;
     use crate::mesh::halfedge::tests::surface;
-    use crate::step::Sizing;
-    use crate::steps::q_morph::QMorphParams;
-    use crate::steps::q_morph::check::Check;
-    use crate::technique::ground::Ground;
-    use crate::watch::Watch;
+    use crate::technique::isotropic::{lower_sizes, remesh};
 
     /// A closed rod of `rings` rings of twelve vertices, 10 long and 0.5 thick.
     fn rod(rings: u32) -> Surface {
@@ -95,21 +102,25 @@ mod tests {
         let surface = rod(60);
         let (ground, watch) = (Ground::new(&surface), Watch::silent());
         let check = Check::new(&ground, &watch).unwrap();
-        let params = QMorphParams { size: Sizing::from(crate::step::Length::Absolute(1.0)), ..QMorphParams::default() };
-        let work = Morpher { ground: &ground, params: &params, check: &check, scale: 1.0, watch: &watch };
         let rules = Rules {
             tolerance: 0.03,
             curve_tolerance: 0.01,
             shortest: 0.0,
             least_size: 0.1,
-            floor: 0.02,
+            floor: 0.002,
             gradation: 0.3,
         };
-        let coarse = work.folds(&work.triangles(&[], rules).unwrap(), rules).unwrap();
-        let attempt = work.untangled(rules, &QMorphStats { regions: 1, ..QMorphStats::default() }).unwrap().unwrap();
-        // The spindle's ends are sharper than any size.
-        let fine = work.folds(&attempt.triangles, rules).unwrap();
+        let make = |places: &[Wish]| {
+            let mut mesh = ground.workshop().unwrap();
+            (0..mesh.vertex_slots()).for_each(|v| mesh.set_size(v, 1.0));
+            lower_sizes(&mut mesh, places, rules.floor);
+            remesh(&mut mesh, &ground, rules, &watch)?;
+            Ok(mesh)
+        };
+        let coarse = folds(&make(&[]).unwrap(), &ground, &check, rules, &watch).unwrap();
+        let made = untangled(&ground, &check, rules, &watch, &make).unwrap();
+        let fine = folds(&made, &ground, &check, rules, &watch).unwrap();
         assert!(fine.is_empty() && coarse.len() > 4, "{} and {}", fine.len(), coarse.len());
-        assert!(attempt.flaws.crossing.is_empty());
+        assert_eq!(made.faults(), [] as [String; 0]);
     }
 }
