@@ -29,7 +29,7 @@ pub use parity::{odd_regions, pair_up};
 use super::ground::Ground;
 use super::mixed::{Mixed, NONE, Place, triangle_quality};
 use crate::mesh::bvh::SegmentBvh;
-use crate::mesh::geometry::Aabb;
+use crate::mesh::geometry::{Aabb, triangle_area};
 use crate::watch::{Cancelled, Watch};
 
 /// What to hold to.
@@ -53,6 +53,11 @@ pub struct Rules {
 const ADAPTATIONS: usize = 4;
 /// Most rounds of edits between two such measurements.
 const ROUNDS: usize = 5;
+/// Splits end where there are so many times the faces that the sizes ask for: a mesh that has folded up grows by them
+/// without end.
+const GROWTH: f64 = 8.0;
+/// The area of a triangle of sides of length 1.
+const EQUILATERAL: f64 = 0.433;
 /// Rounds end where fewer than one edge in so many collapses.
 const QUIET: usize = 1000;
 /// Passes of collapses in a round; all but the first look only next to what the one before did.
@@ -234,8 +239,21 @@ impl Remesher<'_, '_> {
         }
     }
 
+    /// How many faces the sizes ask for.
+    fn wanted_faces(&self) -> f64 {
+        let wanted = |f: u32| {
+            let size = self.mesh.corners(f).iter().map(|&v| self.mesh.size(v)).sum::<f64>() / 3.0;
+            triangle_area(self.mesh.triangle(f)) / (EQUILATERAL * size * size)
+        };
+        self.mesh.faces().map(wanted).sum()
+    }
+
     fn split_long(&mut self) {
+        let most = GROWTH * self.wanted_faces() + 2.0 * self.mesh.faces().count() as f64;
         for _ in 0..12 {
+            if self.mesh.faces().count() as f64 > most {
+                break;
+            }
             let mut long: Vec<(f64, u32)> = Vec::new();
             for h in self.mesh.edges() {
                 if self.sleeps(h) {
