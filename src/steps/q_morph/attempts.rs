@@ -213,13 +213,19 @@ impl Morpher<'_, '_> {
         let Attempt { quads, flaws, stats, awake, .. } = attempt;
         *flaws = flatten(quads, ground, check, rules.tolerance, flaws, watch)?;
         awake.fill(true);
+        let (mut pieced, mut after) = (quads.clone(), flaws.clone());
         let mut rework = Rework { ground, check, rules, watch, aim: Aim::Flat, drawn: FxHashSet::default() };
-        let reworked = rework.run(quads, flaws, awake)?;
-        if reworked > 0 {
+        let reworked = rework.run(&mut pieced, &mut after, awake)?;
+        if reworked == 0 {
+            return Ok(());
+        }
+        pieced.compact();
+        after = check.flaws(&pieced, rules.tolerance, watch)?;
+        after = flatten(&mut pieced, ground, check, rules.tolerance, &after, watch)?;
+        // A draw is judged by what is near it, and flatter quads are not worth a flaw.
+        if after.faults.len() <= flaws.faults.len() && after.crossing.len() <= flaws.crossing.len() {
             stats.reworked += reworked;
-            quads.compact();
-            *flaws = check.flaws(quads, rules.tolerance, watch)?;
-            *flaws = flatten(quads, ground, check, rules.tolerance, flaws, watch)?;
+            (*quads, *flaws) = (pieced, after);
         }
         Ok(())
     }

@@ -7,7 +7,7 @@ use smallvec::SmallVec;
 
 use crate::mesh::bvh::SegmentBvh;
 use crate::mesh::{Carried, FaceId, Freedom, Regions, Soup, VertexId, edge_key};
-use crate::technique::ground::Ground;
+use crate::technique::ground::{Curve, Ground};
 use crate::technique::mixed::{Mixed, Place};
 
 /// The finished mesh with what it carries.
@@ -54,12 +54,18 @@ fn carry_edges(soup: &Soup, ground: &Ground<'_>, arcs: &[([VertexId; 2], u32)], 
         let on = |edge: [VertexId; 2], arc: u32| {
             let curve = &ground.curves[arc as usize];
             let at = curve.nearest(0.5 * (soup.points[edge[0]] + soup.points[edge[1]]));
-            let i = curve.along.partition_point(|&s| s < at).clamp(1, curve.along.len() - 1);
-            members.binary_search(&edge_key(curve.vertices[i - 1], curve.vertices[i])).is_ok()
+            let [a, b] = edge_at(curve, at);
+            members.binary_search(&edge_key(a, b)).is_ok()
         };
         let list = arcs.iter().filter(|(edge, arc)| on(*edge, *arc)).map(|(edge, _)| *edge).collect();
         carried.groups.edges.insert(name.clone(), list);
     }
+}
+
+/// The surface's edge at a length along a curve.
+fn edge_at(curve: &Curve, at: f64) -> [VertexId; 2] {
+    let i = curve.along.partition_point(|&s| s < at).clamp(1, curve.along.len() - 1);
+    [curve.vertices[i - 1], curve.vertices[i]]
 }
 
 /// A vertex belongs to the groups of the whole face that it lies on, or of the whole edge where it lies on a curve: to those
@@ -86,11 +92,7 @@ fn carry_vertices(soup: &Soup, places: &[Place], ground: &Ground<'_>, carried: &
 fn corners_under(ground: &Ground<'_>, point: DVec3, place: Place) -> SmallVec<[VertexId; 3]> {
     match place {
         Place::Node => SmallVec::new(),
-        Place::Arc { arc, at } => {
-            let curve = &ground.curves[arc as usize];
-            let i = curve.along.partition_point(|&s| s < at).clamp(1, curve.along.len() - 1);
-            SmallVec::from_slice(&[curve.vertices[i - 1], curve.vertices[i]])
-        }
+        Place::Arc { arc, at } => SmallVec::from_slice(&edge_at(&ground.curves[arc as usize], at)),
         Place::Region(region) => SmallVec::from_slice(&ground.surface.faces[ground.project(region, point).face]),
     }
 }
