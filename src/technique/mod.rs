@@ -11,6 +11,7 @@ pub mod defeature;
 pub mod dispersion;
 pub mod eigen;
 pub mod feature;
+pub mod fill;
 pub mod fit;
 pub mod flat_flips;
 pub mod front;

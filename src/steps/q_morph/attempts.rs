@@ -16,7 +16,7 @@ use super::search::Search;
 use super::settle::settle;
 use super::untangle::untangled;
 use super::{QMorphError, QMorphParams, QMorphStats, sizes};
-use crate::technique::clean_quads::{clean, finish};
+use crate::technique::clean_quads::{clean, finish, regularise};
 use crate::technique::front::advance;
 use crate::technique::ground::Ground;
 use crate::technique::isotropic::{Rules, lower_sizes, pair_up, polish, remesh, tighten};
@@ -320,6 +320,7 @@ fn advance_and_clean(
     }
     watch.phase("cleaning up", None);
     stats.clean_edits += clean(mesh, ground, rules.curve_tolerance, awake, watch)?.edits;
+    stats.clean_edits += regularise(mesh, ground, rules.curve_tolerance, awake, watch)?;
     Ok(())
 }
 

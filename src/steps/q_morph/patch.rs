@@ -10,7 +10,7 @@ use crate::technique::front::advance;
 use crate::technique::ground::Ground;
 use crate::technique::isotropic::{Rules, polish, refill};
 use crate::technique::join::{join_along_paths, join_neighbours};
-use crate::technique::mixed::{Corners, Mixed, NONE, Place, triangle_quality};
+use crate::technique::mixed::{Corners, Disk, Mixed, NONE, Place, triangle_quality};
 use crate::watch::{Cancelled, Watch};
 
 /// A patch with more than so many times the faces has an unlucky rim, and comes out poor after long work.
@@ -47,7 +47,8 @@ impl Patch {
             }
             last = last.end..disk.grow(mesh, ring);
         }
-        let rim = disk.rim(mesh);
+        let mut rim = disk.rim(mesh);
+        rim.sort_unstable();
         (disk.faces.len() > 1).then_some(Self { faces: disk.faces, region, rim })
     }
 
@@ -156,64 +157,6 @@ impl Patch {
 
 fn is_rim(mesh: &Mixed, h: u32) -> bool {
     mesh.face(h) == NONE || mesh.face(h ^ 1) == NONE
-}
-
-/// Faces that are a disk whose rim touches itself nowhere.
-struct Disk {
-    faces: Vec<u32>,
-    inside: FxHashSet<u32>,
-    vertices: FxHashSet<u32>,
-}
-
-impl Disk {
-    fn of(mesh: &Mixed, face: u32) -> Self {
-        let vertices = mesh.corners(face).into_iter().collect();
-        Self { faces: vec![face], inside: FxHashSet::from_iter([face]), vertices }
-    }
-
-    /// Adds those of the faces that leave it a disk, in their order, until none does. Returns how many it has then.
-    fn grow(&mut self, mesh: &Mixed, mut ring: Vec<u32>) -> usize {
-        loop {
-            let before = self.faces.len();
-            ring.retain(|f| !self.inside.contains(f));
-            for &f in &ring {
-                if !self.inside.contains(&f) && self.may_add(mesh, f) {
-                    self.faces.push(f);
-                    self.inside.insert(f);
-                    self.vertices.extend(mesh.corners(f));
-                }
-            }
-            if self.faces.len() == before {
-                return before;
-            }
-        }
-    }
-
-    /// Whether a face meets the disk in one chain of sides, which has no vertex within that must stay on the rim.
-    fn may_add(&self, mesh: &Mixed, f: u32) -> bool {
-        let sides: Vec<u32> = mesh.sides(f).collect();
-        let joins = |h: u32| self.inside.contains(&mesh.face(h ^ 1));
-        let starts = |&h: &u32| joins(h) && !joins(mesh.prev(h));
-        let is_one_chain = sides.iter().filter(|h| starts(h)).count() == 1;
-        is_one_chain
-            && sides.iter().all(|&h| {
-                let v = mesh.origin(h);
-                match (joins(mesh.prev(h)), joins(h)) {
-                    (true, true) => mesh.place(v).is_free() && mesh.arc(h) == NONE,
-                    (false, false) => !self.vertices.contains(&v),
-                    (_, joins) => !joins || mesh.arc(h) == NONE,
-                }
-            })
-    }
-
-    /// The vertices of its rim, in order.
-    fn rim(&self, mesh: &Mixed) -> Vec<u32> {
-        let is_rim = |h: &u32| !self.inside.contains(&mesh.face(h ^ 1));
-        let sides = self.faces.iter().flat_map(|&f| mesh.sides(f));
-        let mut rim: Vec<u32> = sides.filter(is_rim).map(|h| mesh.origin(h)).collect();
-        rim.sort_unstable();
-        rim
-    }
 }
 
 /// A face as triangles, a quad cut where the poorer one is better.

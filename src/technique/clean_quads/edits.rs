@@ -354,7 +354,7 @@ impl Cleaner<'_, '_> {
     }
 
     /// The sum of misfits and the least quality at these vertices.
-    fn judge(&self, vertices: &[u32]) -> (f64, f64) {
+    pub(super) fn judge(&self, vertices: &[u32]) -> (f64, f64) {
         let mut faces: SmallVec<[u32; 64]> = vertices.iter().flat_map(|&v| self.mesh.faces_at(v)).collect();
         faces.sort_unstable();
         faces.dedup();
@@ -366,7 +366,7 @@ impl Cleaner<'_, '_> {
         vertices.iter().map(|&v| self.misfit(v)).sum()
     }
 
-    fn corners_of(&self, faces: &[u32]) -> Vec<u32> {
+    pub(super) fn corners_of(&self, faces: &[u32]) -> Vec<u32> {
         let mut all: Vec<u32> = faces.iter().flat_map(|&f| self.mesh.corners(f)).collect();
         all.sort_unstable();
         all.dedup();

@@ -18,6 +18,7 @@
 //! # Cost
 //! O(vertices) a pass; passes stop when nothing gains.
 
+mod cavity;
 mod edits;
 mod memory;
 mod relax;
@@ -35,7 +36,9 @@ const GOOD: f64 = 0.35;
 
 /// Faces below this are worth edits that make valences worse.
 const POOR: f64 = 0.5;
-/// Rounds of such edits.
+/// How often cavities are grown round all irregular vertices.
+const CAVITIES: usize = 4;
+/// Rounds of edits for poor faces.
 const RESCUES: usize = 5;
 
 /// What was done.
@@ -99,6 +102,20 @@ pub fn clean(
     Ok(report)
 }
 
+/// Fills cavities round irregular vertices of clean quads anew, in the regions that are `awake`. Returns the number of
+/// edits.
+pub fn regularise(
+    mesh: &mut Mixed,
+    ground: &Ground<'_>,
+    curve_tolerance: f64,
+    awake: &[bool],
+    watch: &Watch,
+) -> Result<usize, Cancelled> {
+    let edits = Cleaner::new(mesh, ground, curve_tolerance, awake).cavities(watch)?;
+    mesh.compact();
+    Ok(edits)
+}
+
 /// Optimises the shapes of clean quads to the end, and mends poor ones at the price of regular vertices, in the regions
 /// that are `awake`.
 pub fn finish(
@@ -123,6 +140,20 @@ pub fn finish(
 }
 
 impl Cleaner<'_, '_> {
+    /// Fills cavities anew, and cleans what that left, until nothing gains. Returns the number of edits.
+    fn cavities(&mut self, watch: &Watch) -> Result<usize, Cancelled> {
+        let mut edits = 0;
+        let mut refused = cavity::Refused::default();
+        for _ in 0..CAVITIES {
+            let filled = self.fill_cavities(&mut refused, watch)?;
+            if filled == 0 {
+                break;
+            }
+            edits += filled + self.pass(true);
+        }
+        Ok(edits)
+    }
+
     /// One look at every vertex and quad. Returns the number of edits.
     fn pass(&mut self, thorough: bool) -> usize {
         let mut edits = 0;

@@ -36,15 +36,15 @@ pub fn sharpest_sector(mesh: &Mixed) -> Option<f64> {
 /// between them.
 pub fn sharpest_sector_of(mesh: &Mixed, f: u32) -> Option<f64> {
     let at_nodes = mesh.sides(f).filter(|&h| mesh.place(mesh.origin(h)) == Place::Node);
-    at_nodes.filter_map(|h| sector_of(mesh, h)).min_by(f64::total_cmp)
+    at_nodes.filter_map(|h| sector_of(mesh, h)).map(|(_, angle)| angle).min_by(f64::total_cmp)
 }
 
-/// The angle of the sector that the corner at the origin of `h` belongs to; `None` at a vertex without curves.
-fn sector_of(mesh: &Mixed, h: u32) -> Option<f64> {
+/// The sector that the corner at the origin of `h` belongs to, its quads and its angle; `None` at a vertex without curves.
+pub(super) fn sector_of(mesh: &Mixed, h: u32) -> Option<(f64, f64)> {
     let mut found = None;
     walk_sectors(mesh, mesh.origin(h), |corners, angle| {
         if corners.contains(&h) {
-            found = Some(angle);
+            found = Some((corners.len() as f64, angle));
         }
     });
     found
@@ -58,7 +58,7 @@ pub(super) fn sectors(mesh: &Mixed, v: u32) -> SmallVec<[(f64, f64); 8]> {
 }
 
 /// Visits each sector at a vertex with its corners, as the sides that leave the vertex, and its angle.
-fn walk_sectors(mesh: &Mixed, v: u32, mut visit: impl FnMut(&[u32], f64)) {
+pub(super) fn walk_sectors(mesh: &Mixed, v: u32, mut visit: impl FnMut(&[u32], f64)) {
     let star: SmallVec<[u32; 16]> = mesh.star(v).collect();
     let bound = |h: u32| mesh.arc(h) != NONE || mesh.face(h) == NONE || mesh.face(h ^ 1) == NONE;
     let Some(start) = star.iter().position(|&h| bound(h)) else { return };

@@ -2,9 +2,9 @@
 //! is opened there.
 
 use super::Layout;
-use super::pattern::Pattern;
 use super::proposal::Proposal;
 use crate::mesh::VertexId;
+use crate::technique::fill::Pattern;
 
 /// Quads of less quality are not made of two triangles.
 const LEAST: f64 = 0.2;

@@ -1,31 +1,14 @@
-//! Where the nodes of a new pattern should lie on a cavity that is bent: its old cells are laid flat in the unit disk,
-//! the pattern too, and each new node is found among the old cells and taken back with them.
+//! Cells laid flat, so that nodes of a new pattern are found on them.
 
 use std::collections::BTreeMap;
 
-use glam::{DVec2, DVec3};
-
 use super::Layout;
-use super::pattern::Pattern;
 use crate::mesh::VertexId;
+use crate::technique::fill::Flat;
 
-/// Some cells laid flat, as triangles with their corners in the disk and in space.
-pub(crate) struct Flat {
-    rim: Vec<DVec3>,
-    triangles: Vec<([DVec2; 3], [DVec3; 3])>,
-}
-
-impl Flat {
-    /// Lays cells flat whose rim is given: the rim on the circle by length, the nodes inside by Tutte's map.
-    pub(crate) fn new(layout: &Layout<'_>, cells: &[u32], rim: &[VertexId]) -> Self {
-        let point = |v: VertexId| layout.ground.point(v);
-        let (mut at, mut length) = (Vec::with_capacity(rim.len()), 0.0);
-        for (k, &v) in rim.iter().enumerate() {
-            at.push(length);
-            length += point(v).distance(point(rim[(k + 1) % rim.len()]));
-        }
-        let turn = std::f64::consts::TAU / length.max(f64::MIN_POSITIVE);
-        let circle: Vec<DVec3> = at.iter().map(|s| DVec3::new(libm::cos(s * turn), libm::sin(s * turn), 0.0)).collect();
+impl Layout<'_> {
+    /// Lays cells flat whose rim is given.
+    pub(super) fn lay_flat(&self, cells: &[u32], rim: &[VertexId]) -> Flat {
         let mut index: BTreeMap<VertexId, usize> = rim.iter().enumerate().map(|(k, &v)| (v, k)).collect();
         let mut nodes = rim.to_vec();
         let mut faces = Vec::with_capacity(cells.len());
@@ -36,41 +19,9 @@ impl Flat {
                     nodes.len() - 1
                 })
             };
-            faces.push(layout.nodes(cell).into_iter().map(corner).collect::<Vec<_>>());
+            faces.push(self.nodes(cell).into_iter().map(corner).collect::<Vec<_>>());
         }
-        let mut pattern = Pattern { rim: rim.len(), inner: vec![DVec3::ZERO; nodes.len() - rim.len()], faces };
-        pattern.relax(&circle);
-        let flat = |k: usize| (if k < rim.len() { circle[k] } else { pattern.inner[k - rim.len()] }).truncate();
-        let cut = pattern.faces.iter().flat_map(|face| (2..face.len()).map(move |k| [face[0], face[k - 1], face[k]]));
-        let triangles = cut.map(|corners| (corners.map(flat), corners.map(|k| point(nodes[k])))).collect();
-        Self { rim: circle, triangles }
-    }
-
-    /// Puts the inner nodes of a pattern over the same rim where they should lie.
-    pub(crate) fn place(&self, pattern: &mut Pattern) {
-        pattern.relax(&self.rim);
-        for p in &mut pattern.inner {
-            *p = self.lifted(p.truncate()).unwrap_or(*p);
-        }
-    }
-
-    /// The point of the cells that lies over a place in the disk.
-    fn lifted(&self, p: DVec2) -> Option<DVec3> {
-        let mut best: Option<(f64, DVec3)> = None;
-        for ([a, b, c], corners) in &self.triangles {
-            let area = (*b - *a).perp_dot(*c - *a);
-            if area.abs() < 1e-15 {
-                continue;
-            }
-            let (v, w) = ((p - *a).perp_dot(*c - *a) / area, (*b - *a).perp_dot(p - *a) / area);
-            let shares = [1.0 - v - w, v, w];
-            let inside = shares.iter().copied().fold(f64::INFINITY, f64::min);
-            if best.is_none_or(|b| inside > b.0) {
-                let held = shares.map(|s| s.max(0.0));
-                let total: f64 = held.iter().sum();
-                best = Some((inside, (0..3).map(|k| corners[k] * (held[k] / total)).sum()));
-            }
-        }
-        best.map(|b| b.1)
+        let points: Vec<_> = nodes.into_iter().map(|v| self.ground.point(v)).collect();
+        Flat::new(&points, rim.len(), faces)
     }
 }

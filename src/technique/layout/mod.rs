@@ -20,7 +20,7 @@ pub mod ground;
 mod lift;
 pub mod optimise;
 mod parallel;
-pub mod pattern;
+mod part;
 pub mod polygon;
 pub mod proposal;
 pub mod replace;
@@ -34,7 +34,6 @@ pub use export::to_quads;
 pub use finder::{Finder, Terrain, along};
 pub use finer::{Room, cut_again, with_rings};
 pub use ground::{Ground, Side, components};
-pub use pattern::Pattern;
 pub use replace::Undo;
 
 use crate::mesh::id::{Face, Vertex};

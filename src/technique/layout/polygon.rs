@@ -3,8 +3,8 @@
 use glam::DVec3;
 
 use super::Layout;
-use super::pattern::Pattern;
 use crate::mesh::VertexId;
+use crate::technique::fill::Pattern;
 
 /// What a triangle costs beside the square of what its quality lacks.
 const TRIANGLE: f64 = 2.0;

@@ -7,12 +7,11 @@ use glam::DVec3;
 use rustc_hash::FxHashMap;
 
 use super::ground::Ground;
-use super::lift::Flat;
-use super::pattern::Pattern;
 use super::replace::Undo;
 use super::{Layout, quality};
 use crate::mesh::id::Vertex;
 use crate::mesh::{IdVec, VertexId};
+use crate::technique::fill::{Flat, Pattern, is_new};
 
 /// What a triangle costs; an inner node with one patch too many costs 1.
 pub(super) const TRIANGLE: f64 = 6.0;
@@ -23,17 +22,8 @@ const BORDER: f64 = 1.5;
 /// regular, and no use.
 const LIMB: f64 = 8.0;
 
-/// A node of a proposal that is not there yet.
-pub(super) fn new_node(number: usize) -> VertexId {
-    VertexId::from_raw(u32::MAX - 1 - number as u32)
-}
-
 /// A border that turns by more between straight edges, in right angles, has a corner there.
 const COARSE: f64 = 2.0 / 3.0;
-
-fn is_new(v: VertexId) -> bool {
-    v.raw() > u32::MAX / 2
-}
 
 /// Cells to take away, and polygons over old and new nodes to put there.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
@@ -203,7 +193,7 @@ impl Layout<'_> {
         /// Fewer cells are nearly flat; what is relaxed keeps its connectivity and must not stay where it is.
         const BENT: usize = 8;
         let rim = self.rim(&proposal.cells)?;
-        let flat = (proposal.cells.len() > BENT).then(|| Flat::new(self, &proposal.cells, &rim));
+        let flat = (proposal.cells.len() > BENT).then(|| self.lay_flat(&proposal.cells, &rim));
         let pattern = self.pattern(&rim, &proposal.faces, flat.as_ref());
         self.fill(&proposal.cells, &rim, &pattern, least)
     }

@@ -8,9 +8,10 @@ use rustc_hash::FxHashSet;
 
 use super::finder::{Terrain, along};
 use super::ground::Side;
-use super::pattern::{Part, Pattern};
+use super::part::Part;
 use super::{Corner, Layout};
 use crate::mesh::{FaceId, VertexId};
+use crate::technique::fill::Pattern;
 use glam::DVec3;
 
 /// What a change removed, to bring it back.

@@ -13,6 +13,7 @@
 //! An edit costs O(faces involved); undo costs what was written.
 
 mod build;
+mod disk;
 mod journal;
 mod replace;
 mod shape;
@@ -21,6 +22,7 @@ mod tests;
 
 use glam::DVec3;
 
+pub use disk::Disk;
 use journal::Journal;
 pub use shape::{corner_sine, quad_quality, triangle_quality, warp};
 

@@ -1,18 +1,17 @@
 //! Cavities round irregular nodes are filled anew with as few irregular nodes as their rims allow.
 //!
 //! A cavity grows cell by cell, from an irregular node or from the way between two of them; whenever its rim turns like
-//! a polygon of two to six sides it may be filled by the patches of `fill`. So irregular nodes that lie apart cancel
+//! a polygon of two to six sides it may be filled by the patches of [`fill`](crate::technique::fill). So irregular nodes that lie apart cancel
 //! each other out, and of many that make up for one another two are left.
 
 use std::collections::BTreeMap;
 
 use rustc_hash::{FxHashMap, FxHashSet};
 
-use super::fill::{Cut, Faces, Outline};
 use super::{LEAST, Memory};
 use crate::mesh::VertexId;
+use crate::technique::fill::{Cut, Faces, Outline};
 use crate::technique::layout::Layout;
-use crate::technique::layout::lift::Flat;
 use crate::technique::layout::proposal::{Proposal, TRIANGLE};
 use crate::watch::{Cancelled, Watch};
 
@@ -252,7 +251,7 @@ impl Cavity {
         let first = cuts.first().map(|cut| (cut.irregular, off(cut)));
         let equal = cuts.iter().take_while(|cut| Some((cut.irregular, off(cut))) == first).count();
         let step = equal.div_ceil(LOOKS).max(1);
-        let flat = Flat::new(layout, &self.cells, nodes);
+        let flat = layout.lay_flat(&self.cells, nodes);
         let judged = cuts.into_iter().step_by(step).take(LOOKS).filter_map(|cut| {
             let faces = outline.in_two(cut)?;
             Some((layout.misshape(nodes, &faces, &flat), faces))

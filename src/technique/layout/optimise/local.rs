@@ -2,8 +2,9 @@
 
 use super::{LEAST, Memory};
 use crate::mesh::VertexId;
+use crate::technique::fill::new_node;
 use crate::technique::layout::Layout;
-use crate::technique::layout::proposal::{Proposal, new_node};
+use crate::technique::layout::proposal::Proposal;
 use crate::watch::{Cancelled, Watch};
 
 /// A change must lower the cost by more than rounding.

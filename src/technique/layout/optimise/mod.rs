@@ -10,7 +10,6 @@
 //! IJNME 44, 1999.
 
 mod cavity;
-mod fill;
 mod local;
 mod relax;
 mod triangles;

@@ -5,42 +5,53 @@
 //! each take such a patch: a node of three and one of five quads make up for sides that differ. Where a loop turns back,
 //! as round the corner of a hole, the row begins there.
 
+use super::new_node;
+use smallvec::SmallVec;
+
 use crate::mesh::VertexId;
-use crate::technique::layout::proposal::new_node;
+
+/// A number for each side of a loop.
+type Sides = SmallVec<[usize; 8]>;
 
 /// Polygons, said by nodes.
-pub(super) type Faces = Vec<Vec<VertexId>>;
+pub type Faces = Vec<Vec<VertexId>>;
 
 /// A loop of nodes, counter-clockwise, with the places of its corners in rising order, and of the nodes where it turns
 /// back by a right angle.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Outline {
-    pub(super) nodes: Vec<VertexId>,
-    pub(super) corners: Vec<usize>,
-    pub(super) reflex: Vec<usize>,
+pub struct Outline {
+    /// The nodes.
+    pub nodes: Vec<VertexId>,
+    /// Places of corners.
+    pub corners: Vec<usize>,
+    /// Places where it turns back.
+    pub reflex: Vec<usize>,
 }
 
 /// A straight row across a loop: between which places, and of how many edges.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Cut {
-    pub(super) from: usize,
-    pub(super) to: usize,
-    pub(super) edges: usize,
+pub struct Cut {
+    /// The lower place.
+    pub from: usize,
+    /// The higher one.
+    pub to: usize,
+    /// Edges of the row.
+    pub edges: usize,
     /// Whether the end at `from` is a corner of the part ahead of it and of the other one, then those at `to`.
     is_corner: [[bool; 2]; 2],
     /// Parts that have an irregular node.
-    pub(super) irregular: usize,
+    pub irregular: usize,
 }
 
 impl Outline {
     /// The edges of each side; the first begins at the first corner.
-    fn sides(&self) -> Vec<usize> {
+    fn sides(&self) -> Sides {
         let (n, all) = (self.corners.len(), self.nodes.len());
         (0..n).map(|i| (self.corners[(i + 1) % n] + all - 1 - self.corners[i]) % all + 1).collect()
     }
 
     /// One regular patch. `fresh` counts the nodes that are new.
-    pub(super) fn whole(&self, fresh: &mut usize) -> Option<Faces> {
+    pub fn whole(&self, fresh: &mut usize) -> Option<Faces> {
         let sides = self.sides();
         let start = *self.corners.first()?;
         let at = |k: usize| self.nodes[(start + k) % self.nodes.len()];
@@ -58,21 +69,23 @@ impl Outline {
 
     /// The rows that leave a regular patch on both sides, among those as long as `lengths` tells for their ends. Every
     /// node where the loop turns back is an end.
-    pub(super) fn cuts(&self, lengths: impl Fn(VertexId, VertexId) -> [usize; 2]) -> Vec<Cut> {
-        let is_end = |k: &usize| self.corners.binary_search(k).is_err();
-        let inner: Vec<usize> = (0..self.nodes.len()).filter(is_end).collect();
+    pub fn cuts(&self, lengths: impl Fn(VertexId, VertexId) -> [usize; 2]) -> Vec<Cut> {
+        // Corners before each place.
+        let mut before = vec![0; self.nodes.len() + 1];
+        for k in 0..self.nodes.len() {
+            before[k + 1] = before[k] + usize::from(self.corners.binary_search(&k).is_ok());
+        }
+        let inner: Vec<usize> = (0..self.nodes.len()).filter(|&k| before[k] == before[k + 1]).collect();
         let mut all = Vec::new();
         for (i, &from) in inner.iter().enumerate() {
             for &to in &inner[i + 1..] {
-                if !self.reflex.iter().all(|&k| k == from || k == to) {
+                let ahead = before[to] - before[from];
+                let between = [ahead, self.corners.len() - ahead];
+                if between.iter().any(|&n| n > 5) || !self.reflex.iter().all(|&k| k == from || k == to) {
                     continue;
                 }
-                let [least, most] = lengths(self.nodes[from], self.nodes[to]);
-                for edges in least.max(1)..=most {
-                    self.ends(from).iter().for_each(|&a| {
-                        let cuts = self.ends(to).iter().map(|&b| [a, b]);
-                        all.extend(cuts.filter_map(|is_corner| self.cut(from, to, edges, is_corner)));
-                    });
+                for (a, b) in self.ends(from).iter().flat_map(|&a| self.ends(to).iter().map(move |&b| (a, b))) {
+                    self.cuts_between([from, to], [a, b], between, &lengths, &mut all);
                 }
             }
         }
@@ -84,41 +97,58 @@ impl Outline {
         if self.reflex.contains(&place) { &[[true, false], [false, true]] } else { &[[true, true]] }
     }
 
-    /// A row, if both parts beside it take regular patches.
-    fn cut(&self, from: usize, to: usize, edges: usize, is_corner: [[bool; 2]; 2]) -> Option<Cut> {
-        let mut cut = Cut { from, to, edges, is_corner, irregular: 0 };
-        for (first, last, back) in [(from, to, false), (to, from, true)] {
-            // Of the loop's own corners those between both places.
-            let between = self.corners.iter().filter(|&&c| (from < c && c < to) != back).count();
-            let [at_from, at_to] = is_corner.map(|ends| usize::from(ends[usize::from(back)]));
-            let corners = between + at_from + at_to;
-            if !(3..=5).contains(&corners) || !fits(&self.sides_beside([first, last], edges, cut, back)) {
-                return None;
-            }
-            cut.irregular += usize::from(corners != 4);
+    /// The rows between two places, of which the parts beside them have so many of the loop's own corners.
+    fn cuts_between(
+        &self,
+        [from, to]: [usize; 2],
+        is_corner: [[bool; 2]; 2],
+        between: [usize; 2],
+        lengths: impl Fn(VertexId, VertexId) -> [usize; 2],
+        all: &mut Vec<Cut>,
+    ) {
+        let count = |part: usize| between[part] + is_corner.iter().filter(|ends| ends[part]).count();
+        let corners = [count(0), count(1)];
+        if !corners.iter().all(|n| (3..=5).contains(n)) {
+            return;
         }
-        Some(cut)
+        let irregular = corners.iter().filter(|&&n| n != 4).count();
+        let cut = Cut { from, to, edges: 0, is_corner, irregular };
+        // The row is part of the last side of both.
+        let mut sides = [self.sides_beside([from, to], cut, false), self.sides_beside([to, from], cut, true)];
+        let last = corners.map(|n| n - 1);
+        let short = [sides[0][last[0]], sides[1][last[1]]];
+        let [least, most] = lengths(self.nodes[from], self.nodes[to]);
+        for edges in least.max(1)..=most {
+            for part in 0..2 {
+                sides[part][last[part]] = short[part] + edges;
+            }
+            if sides.iter().all(|sides| fits(sides)) {
+                all.push(Cut { edges, ..cut });
+            }
+        }
     }
 
     /// The places of the corners of the part from one end of a row to the other, counted from there.
-    fn corners_beside(&self, [first, last]: [usize; 2], cut: Cut, is_back: bool) -> (Vec<usize>, usize) {
+    fn corners_beside(&self, [first, last]: [usize; 2], cut: Cut, is_back: bool) -> (Sides, usize) {
         let all = self.nodes.len();
         let steps = (last + all - first) % all;
-        let mut corners: Vec<usize> =
-            self.corners.iter().map(|&c| (c + all - first) % all).filter(|&c| c < steps).collect();
         let [at_from, at_to] = cut.is_corner.map(|ends| ends[usize::from(is_back)]);
         let [at_first, at_last] = if is_back { [at_to, at_from] } else { [at_from, at_to] };
+        // In their order from the first end on.
+        let from = self.corners.partition_point(|&c| c < first);
+        let around = self.corners[from..].iter().chain(&self.corners[..from]);
+        let mut corners = Sides::new();
         corners.extend(at_first.then_some(0));
+        corners.extend(around.map(|&c| (c + all - first) % all).filter(|&c| c < steps));
         corners.extend(at_last.then_some(steps));
-        corners.sort_unstable();
         (corners, steps)
     }
 
-    /// The sides of the part between two places and a row of so many edges back.
-    fn sides_beside(&self, ends: [usize; 2], edges: usize, cut: Cut, is_back: bool) -> Vec<usize> {
+    /// The sides of the part between two places and a row of no edges back.
+    fn sides_beside(&self, ends: [usize; 2], cut: Cut, is_back: bool) -> Sides {
         let (corners, steps) = self.corners_beside(ends, cut, is_back);
-        let (n, all) = (corners.len(), steps + edges);
-        (0..n).map(|i| (corners[(i + 1) % n] + all - 1 - corners[i]) % all + 1).collect()
+        let n = corners.len();
+        (0..n).map(|i| if i + 1 < n { corners[i + 1] - corners[i] } else { steps - corners[i] + corners[0] }).collect()
     }
 
     /// The loops on both sides of a row.
@@ -131,13 +161,13 @@ impl Outline {
             let (corners, steps) = self.corners_beside([first, last], cut, is_back);
             let mut nodes: Vec<VertexId> = (0..=steps).map(|k| self.nodes[(first + k) % all]).collect();
             nodes.extend(back);
-            Self { nodes, corners, reflex: Vec::new() }
+            Self { nodes, corners: corners.to_vec(), reflex: Vec::new() }
         };
         [part(from, to, false, &mut row.iter().rev().copied()), part(to, from, true, &mut row.iter().copied())]
     }
 
     /// Two regular patches beside a row.
-    pub(super) fn in_two(&self, cut: Cut) -> Option<Faces> {
+    pub fn in_two(&self, cut: Cut) -> Option<Faces> {
         let mut fresh = 0;
         let [one, other] = self.parts(cut, &mut fresh);
         let mut faces = one.whole(&mut fresh)?;
@@ -148,9 +178,10 @@ impl Outline {
 
 /// Whether a loop of these sides takes a regular patch.
 fn fits(sides: &[usize]) -> bool {
-    match sides {
+    match *sides {
         [a, b, c, d] => a == c && b == d,
-        _ => spokes(sides).is_some(),
+        [_, _, _] | [_, _, _, _, _] => spokes(sides).is_some(),
+        _ => false,
     }
 }
 
@@ -175,12 +206,12 @@ fn grid(a: usize, b: usize, rim: impl Fn(usize) -> VertexId, fresh: &mut usize) 
 }
 
 /// The lengths of the spokes of a patch of three or five sides: side `i` is as long as the spokes `i - 1` and `i + 1`.
-fn spokes(sides: &[usize]) -> Option<Vec<usize>> {
+fn spokes(sides: &[usize]) -> Option<Sides> {
     let n = sides.len();
-    let along = |j: usize| sides[(2 * j + 1) % n] as i64;
+    let along = |j: usize| sides[if 2 * j + 1 < n { 2 * j + 1 } else { (2 * j + 1) % n }] as i64;
     let twice: i64 = (0..n).map(|j| if j % 2 == 0 { along(j) } else { -along(j) }).sum();
-    let mut spokes = vec![0; n];
     let mut length = (twice % 2 == 0).then_some(twice / 2)?;
+    let mut spokes = Sides::from_elem(0, n);
     for j in 0..n {
         spokes[(2 * j) % n] = usize::try_from(length).ok().filter(|&l| l >= 1)?;
         length = along(j) - length;

@@ -1,50 +1,6 @@
-//! Polygons over the rim of a cavity and some nodes inside: what a cavity is filled with.
+//! Parts of a pattern, and the paths that cut them in two.
 
 use std::collections::{BTreeMap, VecDeque};
-
-use glam::DVec3;
-
-/// A disk of polygons. Nodes `0..rim` lie on the rim, counter-clockwise; those behind lie inside.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Pattern {
-    /// Nodes on the rim.
-    pub rim: usize,
-    /// Where the nodes inside should lie, roughly.
-    pub inner: Vec<DVec3>,
-    /// Polygons, counter-clockwise.
-    pub faces: Vec<Vec<usize>>,
-}
-
-impl Pattern {
-    /// One polygon over the whole rim.
-    pub fn polygon(rim: usize) -> Self {
-        Self { rim, inner: Vec::new(), faces: vec![(0..rim).collect()] }
-    }
-
-    /// Puts each node inside at the mean of its neighbours, the rim held fast.
-    pub fn relax(&mut self, rim: &[DVec3]) {
-        /// Enough for cavities of a few dozen cells: what is left is far below the distance of nodes.
-        const SWEEPS: usize = 60;
-        let mut neighbours = vec![Vec::new(); self.inner.len()];
-        for face in &self.faces {
-            for (k, &a) in face.iter().enumerate() {
-                let b = face[(k + 1) % face.len()];
-                if let Some(list) = a.checked_sub(self.rim).and_then(|a| neighbours.get_mut(a)) {
-                    list.push(b);
-                }
-            }
-        }
-        let middle = rim.iter().sum::<DVec3>() / rim.len().max(1) as f64;
-        self.inner.iter_mut().for_each(|p| *p = middle);
-        for _ in 0..SWEEPS {
-            for (k, list) in neighbours.iter().enumerate() {
-                let at = |&n: &usize| if n < self.rim { rim[n] } else { self.inner[n - self.rim] };
-                let sum: DVec3 = list.iter().map(at).sum();
-                self.inner[k] = sum / list.len().max(1) as f64;
-            }
-        }
-    }
-}
 
 /// Some faces of a pattern that form a disk.
 pub(super) struct Part<'p> {
