@@ -320,7 +320,7 @@ fn advance_and_clean(
     }
     watch.phase("cleaning up", None);
     stats.clean_edits += clean(mesh, ground, rules.curve_tolerance, awake, watch)?.edits;
-    stats.clean_edits += regularise(mesh, ground, rules.curve_tolerance, awake, watch)?;
+    stats.clean_edits += regularise(mesh, ground, [rules.tolerance, rules.curve_tolerance], awake, watch)?;
     Ok(())
 }
 

@@ -80,7 +80,9 @@ impl Settler<'_, '_> {
     fn move_vertex(&mut self, v: u32, target: DVec3) -> bool {
         let Place::Region(region) = self.mesh.place(v) else { return false };
         let (start, normal) = (self.mesh.point(v), self.mesh.normal(v));
-        let points = self.points_near(v);
+        let mut points = self.points_near(v);
+        // A ridge between points that are farther apart than the faces.
+        points.push(target);
         let least = self.mesh.star_quality(v).min(SOUND);
         let reach = self.mesh.star(v).map(|h| self.mesh.length(h)).fold(0.0, f64::max);
         let axis = if normal == DVec3::ZERO { DVec3::Z } else { normal };

@@ -11,16 +11,17 @@ use std::collections::BTreeMap;
 
 use rustc_hash::FxHashMap;
 
-use super::{Cleaner, POOR, valence};
+use super::filling::{cuts, lay_flat, misshape};
+use super::{Cleaner, valence};
 use crate::mesh::VertexId;
-use crate::technique::fill::{Cut, Faces, Flat, Outline, Pattern};
-use crate::technique::mixed::{Corners, Disk, Mixed, NONE, Place, quad_quality};
+use crate::technique::fill::{Cut, Outline, Pattern};
+use crate::technique::mixed::{Disk, Mixed, NONE};
 use crate::watch::{Cancelled, Watch};
 
 /// Larger cavities change more than they gain.
 const LARGEST: usize = 120;
 /// A change must lower the cost by more than rounding.
-const LESS: f64 = 1e-9;
+pub(super) const LESS: f64 = 1e-9;
 
 /// What was looked at round vertices in vain: while those faces are there, another look finds the same.
 #[derive(Debug, Default)]
@@ -67,6 +68,8 @@ struct Cavity {
     turns: [usize; 4],
     /// Faces beside the cavity, with the number of common edges.
     beside: BTreeMap<u32, i32>,
+    /// With fewer faces it is not looked for rows again.
+    rows_from: usize,
 }
 
 impl Cavity {
@@ -74,7 +77,7 @@ impl Cavity {
         let &first = faces.first()?;
         let disk = Disk::of(mesh, first);
         let (seen, beside) = (FxHashMap::default(), BTreeMap::new());
-        let mut cavity = Self { disk, seen, cost: 0.0, rest: 0.0, turns: [0; 4], beside };
+        let mut cavity = Self { disk, seen, cost: 0.0, rest: 0.0, turns: [0; 4], beside, rows_from: 0 };
         cavity.note(mesh, first);
         for _ in 1..faces.len() {
             let &next = faces.iter().find(|&&f| cavity.disk.may_add(mesh, f))?;
@@ -127,7 +130,7 @@ impl Cavity {
     }
 
     /// A filling that costs less than what is there.
-    fn filling(&self, mesh: &Mixed, rim: &[u32]) -> Option<Pattern> {
+    fn filling(&mut self, mesh: &Mixed, rim: &[u32]) -> Option<Pattern> {
         let turn = |v: u32| self.seen.get(&v).and_then(Seen::turn);
         let places = |wanted: i32| (0..rim.len()).filter(|&k| turn(rim[k]) == Some(wanted)).collect::<Vec<_>>();
         let (corners, reflex) = (places(1), places(3));
@@ -135,17 +138,27 @@ impl Cavity {
         let nodes = rim.iter().map(|&v| VertexId::from_raw(v)).collect();
         let outline = Outline { nodes, corners, reflex };
         if let Some(faces) = if is_straight { outline.whole(&mut 0) } else { None } {
-            return self.is_of_the_size(faces.len()).then(|| pattern(rim, &faces, &lay_flat(mesh, &self.disk, rim)));
+            return self.is_of_the_size(faces.len()).then(|| {
+                let mut pattern = Pattern::over(&outline.nodes, &faces);
+                lay_flat(mesh, &self.disk, rim).place(&mut pattern);
+                pattern
+            });
         }
+        // Straight loops of one quad more rarely take a row where those before did not.
+        if is_straight && self.disk.faces.len() < self.rows_from {
+            return None;
+        }
+        self.rows_from = self.disk.faces.len() * 9 / 8 + 1;
         let cuts = cuts(mesh, &outline, self.cost - self.rest);
         let made = |cut: &Cut| outline.in_two(*cut).filter(|faces| self.is_of_the_size(faces.len()));
-        let fillings: Vec<Faces> = cuts.iter().filter_map(made).collect();
+        let mut fillings: Vec<Pattern> =
+            cuts.iter().filter_map(made).map(|faces| Pattern::over(&outline.nodes, &faces)).collect();
         if fillings.is_empty() {
             return None;
         }
         let flat = lay_flat(mesh, &self.disk, rim);
-        let patterns = fillings.iter().map(|faces| pattern(rim, faces, &flat));
-        let judged = patterns.map(|pattern| (misshape(mesh, rim, &pattern), pattern));
+        fillings.iter_mut().for_each(|pattern| flat.place(pattern));
+        let judged = fillings.into_iter().map(|pattern| (misshape(mesh, rim, &pattern), pattern));
         judged.min_by(|a, b| a.0.total_cmp(&b.0)).map(|best| best.1)
     }
 
@@ -195,81 +208,6 @@ fn seen(mesh: &Mixed, h: u32) -> Seen {
             Seen { inside: 0, quads, wanted: 4, cost, rest: 0.0, is_free }
         }
     }
-}
-
-/// Rows that leave fillings in two that cost less than `cost`: some of those that leave least, and are as long as they
-/// should be.
-fn cuts(mesh: &Mixed, outline: &Outline, cost: f64) -> Vec<Cut> {
-    /// How many edges a row may have less or more than its length tells.
-    const SLACK: usize = 1;
-    /// Fillings whose shape is looked at.
-    const LOOKS: usize = 8;
-    if cost <= if outline.reflex.is_empty() { 2.0 } else { 0.0 } + LESS {
-        return Vec::new();
-    }
-    let point = |v: VertexId| mesh.point(v.raw());
-    let nodes = &outline.nodes;
-    let total: f64 = (0..nodes.len()).map(|k| point(nodes[k]).distance(point(nodes[(k + 1) % nodes.len()]))).sum();
-    let mean = (total / nodes.len().max(1) as f64).max(f64::MIN_POSITIVE);
-    let aimed = |a: VertexId, b: VertexId| ((point(a).distance(point(b)) / mean).round() as usize).clamp(1, LARGEST);
-    let mut cuts = outline.cuts(|a, b| [aimed(a, b).saturating_sub(SLACK), aimed(a, b) + SLACK]);
-    cuts.retain(|cut| (cut.irregular as f64) < cost - LESS);
-    let off = |cut: &Cut| aimed(nodes[cut.from], nodes[cut.to]).abs_diff(cut.edges);
-    cuts.sort_by_key(|cut| (cut.irregular, off(cut), cut.from, cut.to));
-    // Of many equally good ones some from everywhere.
-    let first = cuts.first().map(|cut| (cut.irregular, off(cut)));
-    let equal = cuts.iter().take_while(|cut| Some((cut.irregular, off(cut))) == first).count();
-    let step = equal.div_ceil(LOOKS).max(1);
-    cuts.into_iter().step_by(step).take(LOOKS).collect()
-}
-
-/// The faces of a disk laid flat.
-fn lay_flat(mesh: &Mixed, disk: &Disk, rim: &[u32]) -> Flat {
-    let mut index: FxHashMap<u32, usize> = rim.iter().enumerate().map(|(k, &v)| (v, k)).collect();
-    let mut points: Vec<_> = rim.iter().map(|&v| mesh.point(v)).collect();
-    let mut faces = Vec::with_capacity(disk.faces.len());
-    for &f in &disk.faces {
-        let corner = |h: u32| {
-            let v = mesh.origin(h);
-            *index.entry(v).or_insert_with(|| {
-                points.push(mesh.point(v));
-                points.len() - 1
-            })
-        };
-        faces.push(mesh.sides(f).map(corner).collect::<Vec<_>>());
-    }
-    Flat::new(&points, rim.len(), faces)
-}
-
-/// A filling over the rim, its new vertices where they should lie.
-fn pattern(rim: &[u32], faces: &Faces, flat: &Flat) -> Pattern {
-    let mut index: FxHashMap<VertexId, usize> =
-        rim.iter().enumerate().map(|(k, &v)| (VertexId::from_raw(v), k)).collect();
-    let mut corners = Vec::with_capacity(faces.len());
-    for face in faces {
-        let corner = |&node| {
-            let next = index.len();
-            *index.entry(node).or_insert(next)
-        };
-        corners.push(face.iter().map(corner).collect());
-    }
-    let inner = vec![glam::DVec3::ZERO; index.len() - rim.len()];
-    let mut pattern = Pattern { rim: rim.len(), inner, faces: corners };
-    flat.place(&mut pattern);
-    pattern
-}
-
-/// How badly shaped a filling is likely to be, 0 for squares: the mean and the worst of the squares of what its qualities
-/// lack.
-fn misshape(mesh: &Mixed, rim: &[u32], pattern: &Pattern) -> f64 {
-    let point = |n: usize| if n < rim.len() { mesh.point(rim[n]) } else { pattern.inner[n - rim.len()] };
-    let (mut sum, mut worst) = (0.0, 0.0_f64);
-    for face in &pattern.faces {
-        let lack = 1.0 - quad_quality([0, 1, 2, 3].map(|k| point(face[k])));
-        sum += lack * lack;
-        worst = worst.max(lack * lack);
-    }
-    sum / pattern.faces.len().max(1) as f64 + worst
 }
 
 impl Cleaner<'_, '_> {
@@ -331,45 +269,5 @@ impl Cleaner<'_, '_> {
             };
             cavity.add(self.mesh, next);
         }
-    }
-
-    /// Fills a cavity, smooths, and keeps that if it is shaped well enough.
-    fn fill_anew(&mut self, old: &[u32], rim: &[u32], pattern: &Pattern) -> bool {
-        let before = self.judge(&self.corners_of(old));
-        self.mesh.begin();
-        let touched = self.put(old, rim, pattern);
-        let done = touched.is_some_and(|touched| {
-            let least = before.1.min(POOR);
-            self.relax(&touched, 3);
-            if self.judge(&touched).1 < least {
-                self.search_at(&touched);
-            }
-            let after = self.judge(&touched);
-            let is_kept = after.1 >= least && after.0 < before.0 - LESS;
-            if is_kept {
-                self.mesh.commit();
-                self.note_change(&touched);
-            }
-            is_kept
-        });
-        if !done {
-            self.mesh.rollback();
-        }
-        done
-    }
-
-    /// Puts a pattern into the place of faces. Returns its vertices; `None` where it does not fit, and the transaction
-    /// must be rolled back.
-    fn put(&mut self, old: &[u32], rim: &[u32], pattern: &Pattern) -> Option<Vec<u32>> {
-        let region = self.mesh.region(old[0]);
-        let size = rim.iter().map(|&v| self.mesh.size(v)).sum::<f64>() / rim.len() as f64;
-        let mut vertices = rim.to_vec();
-        for &p in &pattern.inner {
-            let foot = self.ground.project(region, p);
-            vertices.push(self.mesh.add_vertex(foot.point, foot.normal, Place::Region(region), size));
-        }
-        let new: Vec<Corners> = pattern.faces.iter().map(|face| face.iter().map(|&k| vertices[k]).collect()).collect();
-        self.mesh.replace(old, &new, None)?;
-        vertices.iter().all(|&v| self.mesh.is_proper(v, 3)).then_some(vertices)
     }
 }

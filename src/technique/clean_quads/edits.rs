@@ -355,11 +355,17 @@ impl Cleaner<'_, '_> {
 
     /// The sum of misfits and the least quality at these vertices.
     pub(super) fn judge(&self, vertices: &[u32]) -> (f64, f64) {
+        let least =
+            self.faces_at_any(vertices).into_iter().map(|f| self.sound_quality(f)).fold(f64::INFINITY, f64::min);
+        (self.misfits(vertices), least)
+    }
+
+    /// The faces at some vertices, in rising order.
+    pub(super) fn faces_at_any(&self, vertices: &[u32]) -> SmallVec<[u32; 64]> {
         let mut faces: SmallVec<[u32; 64]> = vertices.iter().flat_map(|&v| self.mesh.faces_at(v)).collect();
         faces.sort_unstable();
         faces.dedup();
-        let least = faces.into_iter().map(|f| self.sound_quality(f)).fold(f64::INFINITY, f64::min);
-        (self.misfits(vertices), least)
+        faces
     }
 
     fn misfits(&self, vertices: &[u32]) -> f64 {

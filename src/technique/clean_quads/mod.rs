@@ -20,8 +20,11 @@
 
 mod cavity;
 mod edits;
+mod filling;
 mod memory;
 mod relax;
+#[cfg(test)]
+mod tests;
 mod valence;
 
 use super::ground::Ground;
@@ -56,6 +59,8 @@ struct Cleaner<'a, 'g> {
     ground: &'a Ground<'g>,
     /// How far edges may leave their curve when vertices slide along it.
     curve_tolerance: f64,
+    /// How far fillings of cavities may leave the surface.
+    tolerance: f64,
     /// Whether shape counts more than valences.
     is_rescue: bool,
     /// Whether each region takes part.
@@ -65,7 +70,15 @@ struct Cleaner<'a, 'g> {
 
 impl<'a, 'g> Cleaner<'a, 'g> {
     fn new(mesh: &'a mut Mixed, ground: &'a Ground<'g>, curve_tolerance: f64, awake: &'a [bool]) -> Self {
-        Self { mesh, ground, curve_tolerance, is_rescue: false, awake, memory: Memory::default() }
+        Self {
+            mesh,
+            ground,
+            curve_tolerance,
+            tolerance: f64::INFINITY,
+            is_rescue: false,
+            awake,
+            memory: Memory::default(),
+        }
     }
 }
 
@@ -102,16 +115,18 @@ pub fn clean(
     Ok(report)
 }
 
-/// Fills cavities round irregular vertices of clean quads anew, in the regions that are `awake`. Returns the number of
-/// edits.
+/// Fills cavities round irregular vertices of clean quads anew, in the regions that are `awake`. What is within
+/// `tolerance` of the surface stays so, as far as middles of faces and edges tell. Returns the number of edits.
 pub fn regularise(
     mesh: &mut Mixed,
     ground: &Ground<'_>,
-    curve_tolerance: f64,
+    [tolerance, curve_tolerance]: [f64; 2],
     awake: &[bool],
     watch: &Watch,
 ) -> Result<usize, Cancelled> {
-    let edits = Cleaner::new(mesh, ground, curve_tolerance, awake).cavities(watch)?;
+    let mut cleaner = Cleaner::new(mesh, ground, curve_tolerance, awake);
+    cleaner.tolerance = tolerance;
+    let edits = cleaner.cavities(watch)?;
     mesh.compact();
     Ok(edits)
 }

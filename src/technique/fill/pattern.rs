@@ -1,6 +1,9 @@
 //! Polygons over the rim of a cavity and some nodes inside: what a cavity is filled with.
 
 use glam::DVec3;
+use rustc_hash::FxHashMap;
+
+use crate::mesh::VertexId;
 
 /// A disk of polygons. Nodes `0..rim` lie on the rim, counter-clockwise; those behind lie inside.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -17,6 +20,20 @@ impl Pattern {
     /// One polygon over the whole rim.
     pub fn polygon(rim: usize) -> Self {
         Self { rim, inner: Vec::new(), faces: vec![(0..rim).collect()] }
+    }
+
+    /// Polygons over the nodes of a rim and others, which lie inside.
+    pub fn over(rim: &[VertexId], polygons: &[Vec<VertexId>]) -> Self {
+        let mut index: FxHashMap<VertexId, usize> = rim.iter().enumerate().map(|(k, &v)| (v, k)).collect();
+        let mut faces = Vec::with_capacity(polygons.len());
+        for polygon in polygons {
+            let corner = |&node| {
+                let next = index.len();
+                *index.entry(node).or_insert(next)
+            };
+            faces.push(polygon.iter().map(corner).collect());
+        }
+        Self { rim: rim.len(), inner: vec![DVec3::ZERO; index.len() - rim.len()], faces }
     }
 
     /// Puts each node inside at the mean of its neighbours, the rim held fast.

@@ -200,18 +200,7 @@ impl Layout<'_> {
 
     /// Polygons over the nodes of a rim and others, with places for these.
     fn pattern(&self, rim: &[VertexId], polygons: &[Vec<VertexId>], flat: Option<&Flat>) -> Pattern {
-        let mut index: BTreeMap<VertexId, usize> = rim.iter().enumerate().map(|(k, &v)| (v, k)).collect();
-        let mut faces = Vec::with_capacity(polygons.len());
-        for face in polygons {
-            let mut corners = Vec::with_capacity(face.len());
-            for &node in face {
-                let next = index.len();
-                corners.push(*index.entry(node).or_insert(next));
-            }
-            faces.push(corners);
-        }
-        let inner = vec![DVec3::ZERO; index.len() - rim.len()];
-        let mut pattern = Pattern { rim: rim.len(), inner, faces };
+        let mut pattern = Pattern::over(rim, polygons);
         match flat {
             Some(flat) => flat.place(&mut pattern),
             None => pattern.relax(&rim.iter().map(|&v| self.ground.point(v)).collect::<Vec<_>>()),

@@ -1,0 +1,161 @@
+//! Unit tests of cavities: what they make regular, and what they leave as it is.
+
+use glam::{DVec3, dvec3};
+use proptest::prelude::*;
+
+use super::*;
+use crate::mesh::carried::{EdgeMark, MarkCause};
+use crate::mesh::{Facet, Freedom, Soup, Surface, VertexId, edge_key};
+use crate::technique::mixed::NONE;
+
+/// Squares along each side.
+const N: u32 = 12;
+
+fn id(x: u32, y: u32) -> u32 {
+    y * (N + 1) + x
+}
+
+fn squares() -> impl Iterator<Item = [VertexId; 4]> {
+    let square = |(x, y)| [id(x, y), id(x + 1, y), id(x + 1, y + 1), id(x, y + 1)].map(VertexId::from_raw);
+    (0..N * N).map(|i| (i % N, i / N)).map(square)
+}
+
+/// A sheet that is bent by so much, of triangles; marked along the column `wall`.
+fn sheet(bend: f64, wall: Option<u32>) -> Surface {
+    let at = |x: f64, y: f64| dvec3(x, y, bend * libm::sin(0.3 * x) * libm::cos(0.2 * y));
+    let points: Vec<DVec3> = (0..=N).flat_map(|y| (0..=N).map(move |x| at(f64::from(x), f64::from(y)))).collect();
+    let faces: Vec<_> = squares().flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+    let mut surface = Surface { points: points.into(), faces: faces.into(), ..Surface::default() };
+    for (x, y) in wall.into_iter().flat_map(|x| (0..N).map(move |y| (x, y))) {
+        let [a, b] = [id(x, y), id(x, y + 1)].map(VertexId::from_raw);
+        surface.carried.mark(edge_key(a, b), EdgeMark { freedom: Freedom::OnCurve, cause: MarkCause::Feature });
+    }
+    surface
+}
+
+/// The squares of the sheet as quads over its ground.
+fn quads(ground: &Ground<'_>) -> Mixed {
+    let faces: Vec<_> = squares().map(Facet::Quad).collect();
+    let soup = Soup { points: ground.surface.points.clone(), faces: faces.into(), ..Soup::default() };
+    // Of the two triangles of a square the first tells the region.
+    let regions = (0..(N * N) as usize).map(|i| ground.regions[2 * i]).collect();
+    let mesh = ground.workshop().unwrap();
+    let arc = |a: VertexId, b: VertexId| mesh.find(a.raw(), b.raw()).map_or(NONE, |h| mesh.arc(h));
+    let mut quads = Mixed::new(&soup, ground.places.clone(), regions, arc).unwrap();
+    for v in 0..quads.vertex_slots() {
+        quads.set_point(v, quads.point(v), DVec3::Z);
+        quads.set_size(v, 1.0);
+    }
+    quads
+}
+
+/// Turns the edge between two vertices, if there is one between quads of one region.
+fn turn(mesh: &mut Mixed, [a, b]: [u32; 2], left: bool) {
+    let Some(h) = mesh.find(a, b).filter(|&h| mesh.arc(h) == NONE) else { return };
+    let faces = [mesh.face(h), mesh.face(h ^ 1)];
+    if faces.contains(&NONE) || !mesh.place(a).is_free() || !mesh.place(b).is_free() {
+        return;
+    }
+    let corner = |k: u32| mesh.origin(k);
+    let [c, d] = [mesh.target(mesh.next(h)), corner(mesh.prev(h))];
+    let [e, f] = [mesh.target(mesh.next(h ^ 1)), corner(mesh.prev(h ^ 1))];
+    let new = if left { [[e, f, b, c], [c, d, a, e]] } else { [[f, b, c, d], [d, a, e, f]] };
+    mesh.begin();
+    let made = mesh.replace(&faces, &new.map(|corners| corners.into_iter().collect()), None);
+    if made.is_some() && [a, b, c, d, e, f].iter().all(|&v| mesh.is_proper(v, 3)) {
+        mesh.commit();
+    } else {
+        mesh.rollback();
+    }
+}
+
+/// Fills cavities and nothing else.
+fn fill(mesh: &mut Mixed, ground: &Ground<'_>, tolerance: f64) -> usize {
+    let awake = vec![true; ground.region_count()];
+    let mut cleaner = Cleaner::new(mesh, ground, 0.1, &awake);
+    cleaner.tolerance = tolerance;
+    let (mut all, mut refused) = (0, cavity::Refused::default());
+    loop {
+        let filled = cleaner.fill_cavities(&mut refused, &Watch::silent()).unwrap();
+        if filled == 0 {
+            return all;
+        }
+        all += filled;
+    }
+}
+
+/// How far middles of faces and edges are from the surface.
+fn farthest(mesh: &mut Mixed, ground: &Ground<'_>) -> f64 {
+    let all: Vec<u32> = mesh.vertices().collect();
+    Cleaner::new(mesh, ground, 0.1, &[true, true]).farthest(&all)
+}
+
+fn irregular(mesh: &Mixed) -> usize {
+    census(mesh).irregular
+}
+
+#[test]
+fn irregular_vertices_that_lie_apart_cancel_out() {
+    let surface = sheet(0.0, None);
+    let ground = Ground::new(&surface);
+    let mut mesh = quads(&ground);
+    for ([x, y], left) in [([3, 3], true), ([8, 4], false), ([5, 9], true)] {
+        turn(&mut mesh, [id(x, y), id(x + 1, y)], left);
+    }
+    assert_eq!(irregular(&mesh), 12);
+    assert!(fill(&mut mesh, &ground, 1.0) > 0);
+    assert_eq!((irregular(&mesh), mesh.census()), (0, (0, (N * N) as usize)));
+    assert_eq!(mesh.faults(), [] as [String; 0]);
+    let least = mesh.faces().map(|f| mesh.quality(f)).fold(1.0, f64::min);
+    assert!(least > 0.9, "{least}");
+}
+
+#[test]
+fn no_cavity_crosses_a_curve() {
+    let surface = sheet(0.0, Some(6));
+    let ground = Ground::new(&surface);
+    assert_eq!(ground.region_count(), 2);
+    let mut mesh = quads(&ground);
+    for x in [3, 8] {
+        turn(&mut mesh, [id(x, 5), id(x + 1, 5)], true);
+    }
+    fill(&mut mesh, &ground, 1.0);
+    assert_eq!(irregular(&mesh), 0);
+    let on_wall = mesh.edges().filter(|&h| mesh.arc(h) != NONE && mesh.point(mesh.origin(h)).x == 6.0);
+    assert_eq!(on_wall.filter(|&h| mesh.point(mesh.target(h)).x == 6.0).count(), N as usize);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(48))]
+
+    #[test]
+    fn cavities_keep_the_rim_the_curves_and_the_shapes(
+        turns in prop::collection::vec((1..N - 1, 1..N, any::<bool>(), any::<bool>()), 1..14),
+        bend in 0.0..1.0,
+        tolerance in 0.0..0.2,
+        wall in prop::option::of(3..N - 3),
+    ) {
+        let surface = sheet(bend, wall);
+        let ground = Ground::new(&surface);
+        let mut mesh = quads(&ground);
+        for &(x, y, upright, left) in &turns {
+            turn(&mut mesh, if upright { [id(y, x), id(y, x + 1)] } else { [id(x, y), id(x + 1, y)] }, left);
+        }
+        let bound = |mesh: &Mixed| -> Vec<_> {
+            let all = mesh.vertices().filter(|&v| !mesh.place(v).is_free());
+            all.map(|v| mesh.point(v).to_array().map(f64::to_bits)).collect()
+        };
+        let curves = |mesh: &Mixed| mesh.edges().filter(|&h| mesh.arc(h) != NONE).count();
+        let least = |mesh: &Mixed| mesh.faces().map(|f| mesh.quality(f)).fold(1.0, f64::min);
+        let euler = |mesh: &Mixed| mesh.vertices().count() + mesh.faces().count() - mesh.edges().count();
+        let before = (bound(&mesh), curves(&mesh), euler(&mesh));
+        let (poor, odd, far) = (least(&mesh), irregular(&mesh), farthest(&mut mesh, &ground));
+        let filled = fill(&mut mesh, &ground, tolerance);
+        prop_assert_eq!(mesh.faults(), [] as [String; 0]);
+        prop_assert_eq!((bound(&mesh), curves(&mesh), euler(&mesh)), before);
+        prop_assert_eq!(mesh.census().0, 0);
+        prop_assert!(least(&mesh) >= poor.min(POOR) - 1e-12);
+        prop_assert!(farthest(&mut mesh, &ground) <= far.max(tolerance));
+        prop_assert!(irregular(&mesh) < odd || filled == 0);
+    }
+}
