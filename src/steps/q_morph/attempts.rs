@@ -107,7 +107,8 @@ impl Morpher<'_, '_> {
             few = few.or(self.improve_pieces(other.clone(), rules, stats)?);
             first = other;
         }
-        if few.is_fair() {
+        // What is broken by then, more attempts of the kind rarely mend: other rules may.
+        if few.is_fair() || few.lack >= BROKEN {
             return Ok(Some(few));
         }
         let mut many = self.improve(first.clone(), most, rules, stats, false)?;

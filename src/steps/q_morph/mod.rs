@@ -4,13 +4,14 @@
 //! The curves (marked edges, rims, borders of regions) are sampled at the size asked for, the regions between them
 //! remeshed with nearly equilateral triangles, and the number of border edges of each region made even. Then the front
 //! of Q-Morph turns triangles into quads ([`front`](crate::technique::front)), what it leaves is joined
-//! ([`join`](crate::technique::join)), and topology and shapes are cleaned
-//! ([`clean_quads`](crate::technique::clean_quads)). All of it happens on the surface itself: angles are those of the
+//! ([`join`](crate::technique::join)), and topology and shapes are cleaned: by edits of a few quads, and by cavities of
+//! up to 120 that are filled anew ([`clean_quads`](crate::technique::clean_quads)). All of it happens on the surface itself: angles are those of the
 //! triangles, and vertices go back onto the region they belong to.
 //!
 //! Based on: R. Miyazaki, K. Harada. Transformation of a closed 3D triangular mesh to a quadrilateral mesh based on
 //! feature edges; S. J. Owen, M. L. Staten, S. A. Canann, S. Saigal. Advancing front quadrilateral meshing using triangle
-//! transformations. 7th International Meshing Roundtable, 1998.
+//! transformations. 7th International Meshing Roundtable, 1998. The cavities: G. Bunin. Non-local topological clean-up.
+//! 15th International Meshing Roundtable, 2006.
 //!
 //! The distance between triangles and surface is certified both ways first, and sizes are lowered where it is too large.
 //! The same is done with the finished quads: where they are too far away, single vertices are moved over the ridges and
@@ -99,7 +100,8 @@ pub struct QMorphParams {
     pub all_quad: bool,
     /// How often the front may run where distance or shapes are not good enough: two thirds of it with small pieces about
     /// poor places meshed anew, and where that does not do, so often over whole regions and half as often with pieces
-    /// again. Default 12; 1 takes what the first run gives.
+    /// again; where faces are broken, two thirds of it twice more with rougher curves instead. Default 12; 1 takes what
+    /// the first run gives.
     #[schemars(range(min = 1, max = 1000))]
     pub attempts: usize,
     /// The step fails before it begins if the result would have more faces. Default 20 million.

@@ -7,16 +7,21 @@
 //! An edit is done, its neighbourhood smoothed, looked at, and undone unless it gained. The shapes are then improved by
 //! moving one vertex at a time: free ones in the surface, curve vertices along their curve.
 //!
+//! Two irregular vertices that lie apart come together by no such edit. Cavities that hold several of them are filled
+//! anew ([`regularise`]): on parts that halves the share of irregular vertices and more.
+//!
 //! Based on: P. Kinney. CleanUp: improving quadrilateral finite element meshes. 6th International Meshing Roundtable,
 //! 1997; S. A. Canann, S. N. Muthukrishnan, R. K. Phillips. Topological improvement procedures for quadrilateral finite
-//! element meshes. Engineering with Computers 14, 1998.
+//! element meshes. Engineering with Computers 14, 1998; G. Bunin. Non-local topological clean-up. 15th International
+//! Meshing Roundtable, 2006.
 //!
 //! # Invariants
 //! - Curves and nodes stay; only curve vertices slide along their curve.
 //! - No commit makes the least scaled Jacobian of its neighbourhood worse unless it stays above a bound.
 //!
 //! # Cost
-//! O(vertices) a pass; passes stop when nothing gains.
+//! O(vertices) a pass; passes stop when nothing gains. A cavity costs O(faces) to grow, times the rows looked for across
+//! it; its size is bounded.
 
 mod cavity;
 mod edits;
