@@ -36,6 +36,8 @@
 //! - A corner whose angle lies between two numbers of right angles takes either number of elements; so does a node on a
 //!   border that is coarse beside its curve, as round a small hole.
 //! - Where too many vertices are irregular, the interval is shortened step by step to three fifths.
+//! - Quads that are inverted between straight edges, as those that span a bend may be, are mended last, by moving their
+//!   nodes or cutting them otherwise, though that may leave more irregular vertices.
 
 use std::sync::Arc;
 
@@ -342,7 +344,7 @@ pub struct Step;
 
 impl StepContract for Step {
     const NAME: &'static str = "rough-quads";
-    const REVISION: u32 = 9;
+    const REVISION: u32 = 10;
     const INPUTS: &'static [InputDef] = &[InputDef {
         name: "from",
         accepts: &[Port::Surface],

@@ -199,7 +199,7 @@ impl Layout<'_> {
     }
 
     /// Polygons over the nodes of a rim and others, with places for these.
-    fn pattern(&self, rim: &[VertexId], polygons: &[Vec<VertexId>], flat: Option<&Flat>) -> Pattern {
+    pub(super) fn pattern(&self, rim: &[VertexId], polygons: &[Vec<VertexId>], flat: Option<&Flat>) -> Pattern {
         let mut pattern = Pattern::over(rim, polygons);
         match flat {
             Some(flat) => flat.place(&mut pattern),

@@ -46,7 +46,7 @@ fn best(layout: &mut Layout<'_>, proposals: Vec<Proposal>, memory: &mut Memory) 
 }
 
 /// Everything that can be done to a cell and its surroundings.
-fn proposals(layout: &Layout<'_>, cell: u32) -> Vec<Proposal> {
+pub(super) fn proposals(layout: &Layout<'_>, cell: u32) -> Vec<Proposal> {
     let mut all = Vec::new();
     for k in 0..layout.ring(cell).len() {
         if let Some(other) = layout.neighbour(cell, k).filter(|&other| other > cell) {

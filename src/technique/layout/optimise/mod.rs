@@ -13,6 +13,7 @@ mod cavity;
 mod local;
 mod relax;
 mod triangles;
+mod untangle;
 
 use rustc_hash::{FxHashMap, FxHashSet};
 
@@ -103,5 +104,6 @@ pub fn optimise(layout: &mut Layout<'_>, watch: &Watch) -> Result<OptimiseReport
         }
     }
     layout.relax(2, memory, watch)?;
+    report.edits += layout.untangle(watch)?;
     Ok(report)
 }
