@@ -157,7 +157,9 @@ impl Cavity {
             return None;
         }
         let flat = lay_flat(mesh, &self.disk, rim);
-        fillings.iter_mut().for_each(|pattern| flat.place(pattern));
+        for pattern in &mut fillings {
+            flat.place(pattern);
+        }
         let judged = fillings.into_iter().map(|pattern| (misshape(mesh, rim, &pattern), pattern));
         judged.min_by(|a, b| a.0.total_cmp(&b.0)).map(|best| best.1)
     }
@@ -196,18 +198,15 @@ fn place(turn: i32) -> usize {
 fn seen(mesh: &Mixed, h: u32) -> Seen {
     let v = mesh.origin(h);
     let is_free = mesh.place(v).is_free();
-    match if is_free { None } else { valence::sector_of(mesh, h) } {
-        Some((quads, angle)) => {
-            let wanted = valence::ideal(angle);
-            let (cost, rest) = (valence::cost(quads, angle), valence::cost(wanted, angle));
-            Seen { inside: 0, quads: quads as i32, wanted: wanted as i32, cost, rest, is_free }
-        }
-        None => {
-            let quads = mesh.valence(v) as i32;
-            let cost = f64::from((quads - 4) * (quads - 4));
-            Seen { inside: 0, quads, wanted: 4, cost, rest: 0.0, is_free }
-        }
+    let sector = if is_free { None } else { valence::sector_of(mesh, h) };
+    if let Some((quads, angle)) = sector {
+        let wanted = valence::ideal(angle);
+        let (cost, rest) = (valence::cost(quads, angle), valence::cost(wanted, angle));
+        return Seen { inside: 0, quads: quads as i32, wanted: wanted as i32, cost, rest, is_free };
     }
+    let quads = mesh.valence(v) as i32;
+    let cost = f64::from((quads - 4) * (quads - 4));
+    Seen { inside: 0, quads, wanted: 4, cost, rest: 0.0, is_free }
 }
 
 impl Cleaner<'_, '_> {

@@ -5,8 +5,9 @@ use glam::DVec3;
 
 use super::local::proposals;
 use crate::mesh::VertexId;
+use crate::technique::fill::Pattern;
 use crate::technique::layout::Layout;
-use crate::technique::layout::pattern::Pattern;
+
 use crate::watch::{Cancelled, Watch};
 
 /// Cells of less quality are mended.
