@@ -107,8 +107,7 @@ impl Morpher<'_, '_> {
             few = few.or(self.improve_pieces(other.clone(), rules, stats)?);
             first = other;
         }
-        // What is broken by then, more attempts of the kind rarely mend: other rules may.
-        if few.is_fair() || few.lack >= BROKEN {
+        if few.is_fair() {
             return Ok(Some(few));
         }
         let mut many = self.improve(first.clone(), most, rules, stats, false)?;

@@ -100,8 +100,7 @@ pub struct QMorphParams {
     pub all_quad: bool,
     /// How often the front may run where distance or shapes are not good enough: two thirds of it with small pieces about
     /// poor places meshed anew, and where that does not do, so often over whole regions and half as often with pieces
-    /// again; where faces are broken, two thirds of it twice more with rougher curves instead. Default 12; 1 takes what
-    /// the first run gives.
+    /// again. Default 12; 1 takes what the first run gives.
     #[schemars(range(min = 1, max = 1000))]
     pub attempts: usize,
     /// The step fails before it begins if the result would have more faces. Default 20 million.

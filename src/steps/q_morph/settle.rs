@@ -82,7 +82,7 @@ impl Settler<'_, '_> {
         let (start, normal) = (self.mesh.point(v), self.mesh.normal(v));
         let mut points = self.points_near(v);
         // A ridge between points that are farther apart than the faces.
-        points.push(target);
+        points.push(self.ground.project_from(region, target, start).point);
         let least = self.mesh.star_quality(v).min(SOUND);
         let reach = self.mesh.star(v).map(|h| self.mesh.length(h)).fold(0.0, f64::max);
         let axis = if normal == DVec3::ZERO { DVec3::Z } else { normal };

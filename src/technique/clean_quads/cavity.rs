@@ -23,7 +23,10 @@ const LARGEST: usize = 120;
 /// A change must lower the cost by more than rounding.
 pub(super) const LESS: f64 = 1e-9;
 
-/// What was looked at round vertices in vain: while those faces are there, another look finds the same.
+/// A straight loop cut in two keeps up to two irregular vertices: only what costs more is worth a row.
+pub(super) const COSTLY: f64 = 2.0 + LESS;
+
+/// What was looked at round vertices in vain: while those faces are there, another look rarely finds more.
 #[derive(Debug, Default)]
 pub(super) struct Refused {
     cavities: FxHashMap<u32, Vec<u32>>,
@@ -31,7 +34,7 @@ pub(super) struct Refused {
 
 impl Refused {
     fn stands(&self, mesh: &Mixed, v: u32) -> bool {
-        self.cavities.get(&v).is_some_and(|faces| faces.iter().all(|&f| mesh.is_face(f)))
+        self.cavities.get(&v).is_some_and(|faces| !faces.is_empty() && faces.iter().all(|&f| mesh.is_face(f)))
     }
 }
 
@@ -43,9 +46,8 @@ struct Seen {
     /// Quads there are, between two curves or all round, and how many there should be.
     quads: i32,
     wanted: i32,
-    /// What it costs, and what it will once it has the quads that it should have.
+    /// What it costs until it has them.
     cost: f64,
-    rest: f64,
     is_free: bool,
 }
 
@@ -61,9 +63,8 @@ impl Seen {
 struct Cavity {
     disk: Disk,
     seen: FxHashMap<u32, Seen>,
-    /// What its vertices cost now, and will at least.
+    /// What its vertices cost.
     cost: f64,
-    rest: f64,
     /// Vertices of the rim by how many quads inside they should have: 1, 2, 3, and any other number.
     turns: [usize; 4],
     /// Faces beside the cavity, with the number of common edges.
@@ -77,7 +78,7 @@ impl Cavity {
         let &first = faces.first()?;
         let disk = Disk::of(mesh, first);
         let (seen, beside) = (FxHashMap::default(), BTreeMap::new());
-        let mut cavity = Self { disk, seen, cost: 0.0, rest: 0.0, turns: [0; 4], beside, rows_from: 0 };
+        let mut cavity = Self { disk, seen, cost: 0.0, turns: [0; 4], beside, rows_from: 0 };
         cavity.note(mesh, first);
         for _ in 1..faces.len() {
             let &next = faces.iter().find(|&&f| cavity.disk.may_add(mesh, f))?;
@@ -103,7 +104,6 @@ impl Cavity {
             }
             if before.is_none() {
                 self.cost += now.cost;
-                self.rest += now.rest;
             }
             now.inside += 1;
             if let Some(turn) = now.turn() {
@@ -126,7 +126,7 @@ impl Cavity {
             return false;
         }
         let least = (corners as f64 - reflex as f64 - 4.0).abs();
-        self.cost - self.rest > least + LESS
+        self.cost > least + LESS
     }
 
     /// A filling that costs less than what is there.
@@ -148,8 +148,10 @@ impl Cavity {
         if is_straight && self.disk.faces.len() < self.rows_from {
             return None;
         }
-        self.rows_from = self.disk.faces.len() * 9 / 8 + 1;
-        let cuts = cuts(mesh, &outline, self.cost - self.rest);
+        if is_straight && self.cost > COSTLY {
+            self.rows_from = self.disk.faces.len() * 9 / 8 + 1;
+        }
+        let cuts = cuts(mesh, &outline, self.cost);
         let made = |cut: &Cut| outline.in_two(*cut).filter(|faces| self.is_of_the_size(faces.len()));
         let mut fillings: Vec<Pattern> =
             cuts.iter().filter_map(made).map(|faces| Pattern::over(&outline.nodes, &faces)).collect();
@@ -201,12 +203,12 @@ fn seen(mesh: &Mixed, h: u32) -> Seen {
     let sector = if is_free { None } else { valence::sector_of(mesh, h) };
     if let Some((quads, angle)) = sector {
         let wanted = valence::ideal(angle);
-        let (cost, rest) = (valence::cost(quads, angle), valence::cost(wanted, angle));
-        return Seen { inside: 0, quads: quads as i32, wanted: wanted as i32, cost, rest, is_free };
+        let cost = valence::cost(quads, angle);
+        return Seen { inside: 0, quads: quads as i32, wanted: wanted as i32, cost, is_free };
     }
     let quads = mesh.valence(v) as i32;
     let cost = f64::from((quads - 4) * (quads - 4));
-    Seen { inside: 0, quads, wanted: 4, cost, rest: 0.0, is_free }
+    Seen { inside: 0, quads, wanted: 4, cost, is_free }
 }
 
 impl Cleaner<'_, '_> {
@@ -246,7 +248,9 @@ impl Cleaner<'_, '_> {
     fn grow(&mut self, faces: &[u32], looked: &mut Vec<u32>) -> bool {
         /// Refused fillings before a cavity is given up.
         const TRIES: usize = 4;
-        if faces.iter().any(|&f| self.mesh.is_triangle(f) || !self.awake[self.mesh.region(f) as usize]) {
+        if faces.len() > LARGEST
+            || faces.iter().any(|&f| self.mesh.is_triangle(f) || !self.awake[self.mesh.region(f) as usize])
+        {
             return false;
         }
         let Some(mut cavity) = Cavity::new(self.mesh, faces) else { return false };

@@ -368,7 +368,7 @@ impl Cleaner<'_, '_> {
         faces
     }
 
-    fn misfits(&self, vertices: &[u32]) -> f64 {
+    pub(super) fn misfits(&self, vertices: &[u32]) -> f64 {
         vertices.iter().map(|&v| self.misfit(v)).sum()
     }
 

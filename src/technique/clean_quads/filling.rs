@@ -2,7 +2,7 @@
 
 use rustc_hash::FxHashMap;
 
-use super::cavity::LESS;
+use super::cavity::{COSTLY, LESS};
 use super::{Cleaner, POOR};
 use crate::mesh::VertexId;
 use crate::technique::fill::{Cut, Flat, Outline, Pattern};
@@ -18,7 +18,7 @@ pub(super) fn cuts(mesh: &Mixed, outline: &Outline, cost: f64) -> Vec<Cut> {
     const SLACK: usize = 1;
     /// Fillings whose shape is looked at.
     const LOOKS: usize = 8;
-    if cost <= if outline.reflex.is_empty() { 2.0 } else { 0.0 } + LESS {
+    if outline.reflex.is_empty() && cost <= COSTLY {
         return Vec::new();
     }
     let point = |v: VertexId| mesh.point(v.raw());
@@ -73,7 +73,7 @@ impl Cleaner<'_, '_> {
     /// Fills a cavity, smooths, and keeps that if it is shaped well enough.
     pub(super) fn fill_anew(&mut self, old: &[u32], rim: &[u32], pattern: &Pattern) -> bool {
         let ring = self.corners_of(old);
-        let (before, far) = (self.judge(&ring), self.farthest(&ring));
+        let (before, far, poor) = (self.judge(&ring), self.farthest(&ring), self.poor_faces(&ring));
         self.mesh.begin();
         let touched = self.put(old, rim, pattern);
         let done = touched.is_some_and(|touched| {
@@ -83,7 +83,7 @@ impl Cleaner<'_, '_> {
                 self.search_at(&touched);
             }
             let after = self.judge(&touched);
-            let is_better = after.1 >= least && after.0 < before.0 - LESS;
+            let is_better = after.1 >= least && after.0 < before.0 - LESS && self.poor_faces(&touched) <= poor;
             let is_kept = is_better && self.farthest(&touched) <= far.max(NEAR * self.tolerance);
             if is_kept {
                 self.mesh.commit();
@@ -95,6 +95,11 @@ impl Cleaner<'_, '_> {
             self.mesh.rollback();
         }
         done
+    }
+
+    /// How many faces at these vertices are poor.
+    fn poor_faces(&self, vertices: &[u32]) -> usize {
+        self.faces_at_any(vertices).into_iter().filter(|&f| self.sound_quality(f) < POOR).count()
     }
 
     /// The largest distance of the middles of faces and edges at these vertices from the surface.

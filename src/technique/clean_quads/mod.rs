@@ -120,8 +120,9 @@ pub fn clean(
     Ok(report)
 }
 
-/// Fills cavities round irregular vertices of clean quads anew, in the regions that are `awake`. What is within
-/// `tolerance` of the surface stays so, as far as middles of faces and edges tell. Returns the number of edits.
+/// Fills cavities round irregular vertices of clean quads anew, in the regions that are `awake`, and cleans again. A
+/// filling within `tolerance` of the surface, or no farther than what was there, is kept, as far as middles of faces and
+/// edges tell. Returns the number of edits.
 pub fn regularise(
     mesh: &mut Mixed,
     ground: &Ground<'_>,

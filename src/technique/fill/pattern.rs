@@ -38,7 +38,7 @@ impl Pattern {
 
     /// Puts each node inside at the mean of its neighbours, the rim held fast.
     pub fn relax(&mut self, rim: &[DVec3]) {
-        /// Enough for cavities of a few dozen cells: what is left is far below the distance of nodes.
+        /// Enough for a hundred nodes inside: what is left is a hundredth of the disk, and they are smoothed later.
         const SWEEPS: usize = 60;
         let (first, neighbours) = self.neighbours();
         let middle = rim.iter().sum::<DVec3>() / rim.len().max(1) as f64;
