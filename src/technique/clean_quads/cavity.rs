@@ -11,7 +11,7 @@ use std::collections::BTreeMap;
 
 use rustc_hash::FxHashMap;
 
-use super::filling::{cuts, lay_flat, misshape};
+use super::filling::{COSTLY, LESS, cuts, lay_flat, misshape};
 use super::{Cleaner, valence};
 use crate::mesh::VertexId;
 use crate::technique::fill::{Cut, Outline, Pattern};
@@ -20,11 +20,6 @@ use crate::watch::{Cancelled, Watch};
 
 /// Larger cavities change more than they gain.
 const LARGEST: usize = 120;
-/// A change must lower the cost by more than rounding.
-pub(super) const LESS: f64 = 1e-9;
-
-/// A straight loop cut in two keeps up to two irregular vertices: only what costs more is worth a row.
-pub(super) const COSTLY: f64 = 2.0 + LESS;
 
 /// What was looked at round vertices in vain: while those faces are there, another look rarely finds more.
 #[derive(Debug, Default)]

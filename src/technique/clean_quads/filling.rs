@@ -2,12 +2,15 @@
 
 use rustc_hash::FxHashMap;
 
-use super::cavity::{COSTLY, LESS};
 use super::{Cleaner, POOR};
 use crate::mesh::VertexId;
 use crate::technique::fill::{Cut, Flat, Outline, Pattern};
 use crate::technique::mixed::{Corners, Disk, Mixed, Place, quad_quality};
 
+/// A change must lower the cost by more than rounding.
+pub(super) const LESS: f64 = 1e-9;
+/// A straight loop cut in two keeps up to two irregular vertices: only what costs more is worth a row.
+pub(super) const COSTLY: f64 = 2.0 + LESS;
 /// The part of the tolerance that middles of new faces and edges may be away from the surface.
 const NEAR: f64 = 0.8;
 
