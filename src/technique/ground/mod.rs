@@ -104,6 +104,30 @@ impl<'a> Ground<'a> {
         Self { surface, curves, regions, places, arcs, sheets: of.into_iter().map(sheet).collect(), beside, left_out }
     }
 
+    /// Where the ends of an edge on a curve are on it.
+    pub fn ends_on(&self, mesh: &Mixed, h: u32) -> [f64; 2] {
+        let arc = mesh.arc(h);
+        let curve = &self.curves[arc as usize];
+        let ends = [mesh.origin(h), mesh.target(h)];
+        let known = ends.map(|v| match mesh.place(v) {
+            Place::Arc { arc: other, at } if other == arc => Some(at),
+            _ => None,
+        });
+        let length = curve.length();
+        let off = |v: u32, end: f64| curve.at(end).distance_squared(mesh.point(v));
+        match known {
+            [Some(a), Some(b)] => [a, b],
+            [Some(at), None] | [None, Some(at)] => {
+                let node = ends[usize::from(known[0].is_some())];
+                // Of the ends of a closed curve, which are one point, the one on this side.
+                let is_first = if curve.is_closed() { 2.0 * at < length } else { off(node, 0.0) < off(node, length) };
+                known.map(|known| known.unwrap_or(if is_first { 0.0 } else { length }))
+            }
+            [None, None] if off(ends[0], 0.0) <= off(ends[0], length) => [0.0, length],
+            [None, None] => [length, 0.0],
+        }
+    }
+
     /// Number of regions.
     pub fn region_count(&self) -> usize {
         self.sheets.len()

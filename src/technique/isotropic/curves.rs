@@ -1,6 +1,6 @@
 //! Vertices of curves: put where the samples are, or spread evenly.
 
-use super::Remesher;
+use super::{Remesher, Rules};
 use crate::technique::ground::{Ground, respread, sample};
 use crate::technique::mixed::{Mixed, NONE, Place};
 
@@ -39,6 +39,23 @@ pub fn curve_distance(mesh: &Mixed, ground: &Ground<'_>) -> f64 {
         chain.windows(2).map(|pair| curve.sag(pair[0].0, pair[1].0)).fold(0.0, f64::max)
     };
     chains(mesh, ground).into_iter().enumerate().map(sag).fold(0.0, f64::max)
+}
+
+/// Cuts an edge on a curve, which covers it between these lengths from its start, into three, so that the regions beside
+/// it keep an even number of edges. Whether it could.
+pub fn cut_in_three(mesh: &mut Mixed, ground: &Ground<'_>, rules: Rules, h: u32, [from, to]: [f64; 2]) -> bool {
+    let (arc, last) = (mesh.arc(h), mesh.target(h));
+    let size = mesh.length(h) / 3.0;
+    let mut work = Remesher { surplus: Vec::new(), asleep: Vec::new(), mesh, ground, rules };
+    let mut rest = Some(h);
+    for share in [1.0 / 3.0, 2.0 / 3.0] {
+        let at = from + share * (to - from);
+        let point = ground.curves[arc as usize].at(at);
+        let Some(h) = rest else { return false };
+        let Some(v) = work.split(h, point, glam::DVec3::ZERO, Place::Arc { arc, at }, size) else { return false };
+        rest = work.mesh.find(v, last);
+    }
+    true
 }
 
 impl Remesher<'_, '_> {
@@ -178,36 +195,19 @@ impl Remesher<'_, '_> {
         }
     }
 
-    /// From where to where an edge covers its curve.
-    pub(super) fn span(&self, arc: u32, h: u32, length: f64) -> (f64, f64) {
-        let place = |v| match self.mesh.place(v) {
-            Place::Arc { arc: a, at } if a == arc => Some(at),
-            _ => None,
-        };
-        match (place(self.mesh.origin(h)), place(self.mesh.target(h))) {
-            (Some(a), Some(b)) => (a.min(b), a.max(b)),
-            (Some(a), None) | (None, Some(a)) => {
-                // One end is a node: the start's or the end's, whichever it lies at.
-                let node = if place(self.mesh.origin(h)).is_none() { self.mesh.origin(h) } else { self.mesh.target(h) };
-                let curve = &self.ground.curves[arc as usize];
-                let p = self.mesh.point(node);
-                let to_start = (p - curve.points[0]).length_squared();
-                let to_end = (p - curve.points[curve.points.len() - 1]).length_squared();
-                let at_start = if curve.is_closed() { a < 0.5 * length } else { to_start < to_end };
-                if at_start { (0.0, a) } else { (a, length) }
-            }
-            (None, None) => (0.0, length),
-        }
-    }
-
     /// Spreads the vertices of each curve evenly by the sizes there, where both regions beside it are awake.
     pub(super) fn even_curves(&mut self, awake: &[bool]) {
         for (arc, chain) in chains(self.mesh, self.ground).into_iter().enumerate() {
             let sleeps = |&region: &u32| region != NONE && !awake[region as usize];
-            if chain.len() < 3 || self.ground.beside[arc].iter().any(sleeps) {
+            let curve = &self.ground.curves[arc];
+            // In a piece of a mesh there may be a piece of the curve only.
+            let is_whole = |chain: &[(f64, u32)]| {
+                let ends = [chain[0].1, chain[chain.len() - 1].1].map(|v| self.mesh.point(v));
+                ends == [curve.points[0], curve.points[curve.points.len() - 1]]
+            };
+            if chain.len() < 3 || self.ground.beside[arc].iter().any(sleeps) || !is_whole(&chain) {
                 continue;
             }
-            let curve = &self.ground.curves[arc];
             let sizes: Vec<(f64, f64)> = chain.iter().map(|&(at, v)| (at, self.mesh.size(v))).collect();
             let places = respread(&sizes, curve.length(), chain.len() - 1);
             let sag = |at: &[f64]| at.windows(2).map(|pair| curve.sag(pair[0], pair[1])).fold(0.0, f64::max);

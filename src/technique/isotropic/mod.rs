@@ -23,7 +23,7 @@ mod parity;
 use glam::DVec3;
 use smallvec::SmallVec;
 
-pub use curves::{chains, curve_distance};
+pub use curves::{chains, curve_distance, cut_in_three};
 pub use parity::{odd_regions, pair_up};
 
 use super::ground::Ground;

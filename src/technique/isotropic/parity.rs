@@ -90,7 +90,7 @@ impl Remesher<'_, '_> {
     fn halve_on_curve(&mut self, h: u32) -> bool {
         let arc = self.mesh.arc(h);
         let curve = &self.ground.curves[arc as usize];
-        let (from, to) = self.span(arc, h, curve.length());
+        let [from, to] = self.ground.ends_on(self.mesh, h);
         let at = 0.5 * (from + to);
         let size = self.size_of(h);
         self.split(h, curve.at(at), glam::DVec3::ZERO, Place::Arc { arc, at }, size).is_some()

@@ -6,20 +6,28 @@ use smallvec::SmallVec;
 use super::Mixed;
 use super::NONE;
 
-/// Faces that are a disk whose rim touches itself nowhere, and within which no vertex and no edge is bound to a curve.
+/// Faces that are a disk whose rim touches itself nowhere, and within which no vertex and no edge is bound to a curve
+/// unless it may go across.
 #[derive(Clone, Debug)]
 pub struct Disk {
     /// The faces, in the order in which they came.
     pub faces: Vec<u32>,
     inside: FxHashSet<u32>,
     vertices: FxHashSet<u32>,
+    /// Whether it may go across curves.
+    goes_across: bool,
 }
 
 impl Disk {
     /// One face.
     pub fn of(mesh: &Mixed, face: u32) -> Self {
         let vertices = mesh.corners(face).into_iter().collect();
-        Self { faces: vec![face], inside: FxHashSet::from_iter([face]), vertices }
+        Self { faces: vec![face], inside: FxHashSet::from_iter([face]), vertices, goes_across: false }
+    }
+
+    /// One face of a disk that may go across curves.
+    pub fn across(mesh: &Mixed, face: u32) -> Self {
+        Self { goes_across: true, ..Self::of(mesh, face) }
     }
 
     /// Whether a face is one of the disk's.
@@ -64,8 +72,9 @@ impl Disk {
             && sides.iter().enumerate().all(|(i, &(h, joins))| {
                 let v = mesh.origin(h);
                 match (before(i), joins) {
-                    (true, true) => mesh.place(v).is_free() && mesh.arc(h) == NONE,
                     (false, false) => !self.vertices.contains(&v),
+                    _ if self.goes_across => true,
+                    (true, true) => mesh.place(v).is_free() && mesh.arc(h) == NONE,
                     (_, joins) => !joins || mesh.arc(h) == NONE,
                 }
             })
