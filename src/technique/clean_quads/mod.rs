@@ -8,7 +8,8 @@
 //! moving one vertex at a time: free ones in the surface, curve vertices along their curve.
 //!
 //! Two irregular vertices that lie apart come together by no such edit. Cavities that hold several of them are filled
-//! anew ([`regularise`]): on parts that halves the share of irregular vertices and more.
+//! anew ([`regularise`]): on parts that halves the share of irregular vertices and more. The other way round, a ring of
+//! quads makes faces smaller at one place ([`pillow`]).
 //!
 //! Based on: P. Kinney. CleanUp: improving quadrilateral finite element meshes. 6th International Meshing Roundtable,
 //! 1997; S. A. Canann, S. N. Muthukrishnan, R. K. Phillips. Topological improvement procedures for quadrilateral finite
@@ -27,6 +28,7 @@ mod cavity;
 mod edits;
 mod filling;
 mod memory;
+mod pillow;
 mod relax;
 #[cfg(test)]
 mod tests;
@@ -158,6 +160,14 @@ pub fn finish(
         report.rounds += cleaner.optimise(4, watch)?;
     }
     Ok(report)
+}
+
+/// Puts a ring of quads about some quads that form a disk, across curves too, and smooths there, within an open
+/// transaction. Returns the vertices that may have moved; `None` where it cannot be done, and the transaction must be
+/// rolled back.
+pub fn pillow(mesh: &mut Mixed, ground: &Ground<'_>, curve_tolerance: f64, faces: &[u32]) -> Option<Vec<u32>> {
+    let awake = vec![true; ground.region_count()];
+    Cleaner::new(mesh, ground, curve_tolerance, &awake).pillow_about(faces)
 }
 
 impl Cleaner<'_, '_> {

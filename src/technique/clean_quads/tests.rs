@@ -167,3 +167,88 @@ proptest! {
         prop_assert!(misfits(&mut mesh, &ground) < odd || filled == 0);
     }
 }
+
+/// The area of a flat mesh, faces turned over counted as negative.
+fn area(mesh: &Mixed) -> f64 {
+    let of = |f: u32| {
+        let p: Vec<DVec3> = mesh.corners(f).iter().map(|&v| mesh.point(v)).collect();
+        0.5 * (p[2] - p[0]).cross(p[3] - p[1]).z
+    };
+    mesh.faces().map(of).sum()
+}
+
+/// A sheet with a wall, and a ring put about the faces at these vertices.
+fn pillowed(surface: &Surface, around: &[u32]) -> Option<(Mixed, usize)> {
+    let ground = Ground::new(surface);
+    let mut mesh = quads(&ground);
+    let faces = mesh.faces_around(around);
+    mesh.begin();
+    pillow(&mut mesh, &ground, 0.1, &faces)?;
+    mesh.commit();
+    Some((mesh, faces.len()))
+}
+
+#[test]
+fn a_ring_about_faces_adds_one_for_each_edge_of_their_rim() {
+    let surface = sheet(0.0, None);
+    for (around, rim) in [(vec![id(5, 5)], 8), (vec![id(5, 5), id(6, 5)], 10), (vec![id(1, 0)], 6), (vec![id(0, 0)], 4)]
+    {
+        let (mesh, inside) = pillowed(&surface, &around).unwrap();
+        assert_eq!(mesh.faults(), [] as [String; 0]);
+        assert_eq!(mesh.census(), (0, (N * N) as usize + rim), "{inside} faces inside");
+        assert!(mesh.faces().all(|f| mesh.quality(f) > 0.3));
+        assert!((area(&mesh) - f64::from(N * N)).abs() < 1e-9);
+    }
+}
+
+#[test]
+fn a_ring_across_a_curve_gives_it_a_vertex_at_each_crossing() {
+    let surface = sheet(0.0, Some(6));
+    // Round a vertex of the wall, beside it, round an edge on it, and at its end on the rim.
+    for (around, more) in [([6, 5], 2), ([5, 5], 0), ([6, 1], 2), ([6, 0], 2)] {
+        let (mesh, _) = pillowed(&surface, &[id(around[0], around[1])]).unwrap();
+        assert_eq!(mesh.faults(), [] as [String; 0]);
+        assert!((area(&mesh) - f64::from(N * N)).abs() < 1e-9);
+        let wall: Vec<u32> =
+            mesh.edges().filter(|&h| mesh.arc(h) != NONE && mesh.face(h) != NONE && mesh.face(h ^ 1) != NONE).collect();
+        assert_eq!(wall.len(), N as usize + more, "{around:?}");
+        assert!(wall.iter().all(|&h| mesh.point(mesh.origin(h)).x == 6.0 && mesh.point(mesh.target(h)).x == 6.0));
+        let length: f64 = wall.iter().map(|&h| mesh.length(h)).sum();
+        assert!((length - f64::from(N)).abs() < 1e-9, "the wall is covered once");
+        for h in wall {
+            let [left, right] = [h, h ^ 1].map(|k| mesh.region(mesh.face(k)));
+            assert_ne!(left, right, "regions meet on the wall");
+        }
+    }
+}
+
+#[test]
+fn there_is_no_ring_about_what_is_no_disk() {
+    let surface = sheet(0.0, None);
+    assert!(pillowed(&surface, &[id(2, 2), id(8, 8)]).is_none(), "two pieces");
+    let ground = Ground::new(&surface);
+    let mut mesh = quads(&ground);
+    let all = mesh.faces_around(&[id(4, 4), id(6, 4), id(4, 6), id(6, 6)]);
+    let hole = mesh.faces_around(&[id(5, 5)]);
+    let ring: Vec<u32> = all.into_iter().filter(|f| !hole.contains(f)).collect();
+    mesh.begin();
+    assert!(pillow(&mut mesh, &ground, 0.1, &ring).is_none(), "a ring");
+    mesh.rollback();
+    assert_eq!(mesh.census(), (0, (N * N) as usize));
+    assert_eq!(mesh.faults(), [] as [String; 0]);
+}
+
+#[test]
+fn two_quads_round_the_end_of_a_curve_are_to_be_more() {
+    // A fan of two quads about the end of one curve, which have both their edges there in common.
+    let at = |x: f64, y: f64| dvec3(x, y, 0.0);
+    let points = [at(0.0, 0.0), at(1.0, 0.2), at(1.0, -0.2), at(2.0, 1.0), at(2.0, -1.0)];
+    let mut mesh = Mixed::of_faces(&points, &[&[0, 2, 4, 1], &[0, 1, 3, 2]]).unwrap();
+    let surface = Surface::default();
+    let ground = Ground::new(&surface);
+    mesh.set_place(0, Place::Node);
+    let h = mesh.find(0, 1).unwrap();
+    mesh.set_arc(h, 0);
+    let cleaner = Cleaner::new(&mut mesh, &ground, 0.1, &[true]);
+    assert!(cleaner.misfit(0) > 20.0, "{}", cleaner.misfit(0));
+}

@@ -1,5 +1,7 @@
 //! How far valences are from their ideals.
 
+use std::f64::consts::{FRAC_PI_2, TAU};
+
 use smallvec::SmallVec;
 
 use super::Cleaner;
@@ -57,17 +59,19 @@ pub(super) fn sectors(mesh: &Mixed, v: u32) -> SmallVec<[(f64, f64); 8]> {
     found
 }
 
-/// Visits each sector at a vertex with its corners, as the sides that leave the vertex, and its angle.
+/// Visits each sector at a vertex with its corners, as the sides that leave the vertex, and its angle. Round the end of a
+/// curve that is there alone it is a full turn: two quads, folded upon each other, show less.
 pub(super) fn walk_sectors(mesh: &Mixed, v: u32, mut visit: impl FnMut(&[u32], f64)) {
     let star: SmallVec<[u32; 16]> = mesh.star(v).collect();
     let bound = |h: u32| mesh.arc(h) != NONE || mesh.face(h) == NONE || mesh.face(h ^ 1) == NONE;
     let Some(start) = star.iter().position(|&h| bound(h)) else { return };
+    let is_end = star.iter().filter(|&&h| bound(h)).count() == 1;
     let (mut corners, mut angle) = (SmallVec::<[u32; 16]>::new(), 0.0);
     for i in 0..=star.len() {
         let h = star[(start + i) % star.len()];
         if i > 0 && bound(h) {
             if !corners.is_empty() {
-                visit(&corners, angle);
+                visit(&corners, if is_end { TAU } else { angle });
             }
             corners.clear();
             angle = 0.0;
@@ -81,7 +85,7 @@ pub(super) fn walk_sectors(mesh: &Mixed, v: u32, mut visit: impl FnMut(&[u32], f
 
 /// The quads that fit into an angle, in radians.
 pub(super) fn ideal(angle: f64) -> f64 {
-    (angle / std::f64::consts::FRAC_PI_2).round().max(1.0)
+    (angle / FRAC_PI_2).round().max(1.0)
 }
 
 /// What a number of quads in an angle costs: the square of the difference from the ideal, and much where one of them
