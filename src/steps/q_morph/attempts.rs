@@ -1,9 +1,11 @@
 //! From the surface to clean quads, tried again with smaller sizes where distance or shapes are not good enough.
 //!
 //! Every attempt starts from an earlier one ([`search`](super::search)) and makes only those regions anew whose triangles
-//! changed. What is poor in it is meshed anew in small pieces ([`rework`](super::rework)), which few attempts of most parts
-//! need no more than. For the others all begins again with whole regions only: larger steps, that lead elsewhere. Pieces
+//! changed. What is poor in it is meshed anew in small pieces ([`rework`](super::rework)): most parts need one to three
+//! attempts then. For the others all begins again with whole regions only: larger steps, that lead elsewhere. Pieces
 //! are for what is left then.
+
+use std::cell::Cell;
 
 use rustc_hash::FxHashSet;
 
@@ -24,6 +26,8 @@ use crate::technique::join::{join_along_paths, join_neighbours};
 use crate::technique::mixed::Mixed;
 use crate::watch::{Cancelled, Watch};
 
+/// How many times the attempts asked for may follow in all, whatever is tried.
+const IN_ALL: usize = 2;
 /// How often poor places of an attempt are gone through.
 const REWORKS: usize = 2;
 /// How often sizes are lowered beforehand, where the triangles are too far from the surface.
@@ -46,7 +50,8 @@ pub(super) fn morph(
     let regions = ground.region_count();
     let stats = QMorphStats { regions, left_out: ground.left_out, attempts: 1, ..QMorphStats::default() };
     let check = Check::new(ground, watch)?;
-    let work = Morpher { ground, params, check: &check, scale, watch };
+    let left = Cell::new(IN_ALL * params.attempts);
+    let work = Morpher { ground, params, check: &check, scale, watch, left };
     let mut begun = Vec::new();
     let Some(mut best) = work.attempts(rules, &stats, &mut begun)? else { return Err(QMorphError::Empty) };
     // Many pieces on a curve that is rough may be what broke it: none shorter than the least size, then a looser curve.
@@ -63,6 +68,9 @@ pub(super) fn morph(
         }
         best.stats.attempts = attempts;
     }
+    if best.stats.reworked > 0 {
+        work.tidy(&mut best, rules)?;
+    }
     work.flatten(&mut best, rules)?;
     let Attempt { quads, mut stats, .. } = best;
     stats.distance = check.distance(&quads, watch)?;
@@ -77,6 +85,8 @@ struct Morpher<'a, 'g> {
     check: &'a Check,
     scale: f64,
     watch: &'a Watch,
+    /// How many more attempts may follow, in all.
+    left: Cell<usize>,
 }
 
 impl Morpher<'_, '_> {
@@ -100,13 +110,17 @@ impl Morpher<'_, '_> {
         if most == 1 || first.is_good() {
             return Ok(Some(first));
         }
-        let mut few = self.improve_pieces(first.clone(), rules, stats)?;
+        let mut few = self.reworked(first.clone(), rules)?;
         if !few.flaws.crossing.is_empty()
             && let Some(other) = self.begin_untangled(rules, stats)?
         {
-            few = few.or(self.improve_pieces(other.clone(), rules, stats)?);
-            first = other;
+            let reworked = self.reworked(other.clone(), rules)?;
+            if reworked.is_better_than(&few) {
+                first = other;
+            }
+            few = few.or(reworked);
         }
+        let few = self.improve(few, (2 * most).div_ceil(3), rules, stats, true)?;
         if few.is_fair() {
             return Ok(Some(few));
         }
@@ -116,12 +130,6 @@ impl Morpher<'_, '_> {
             many = self.improve(self.reworked(many, rules)?, most.div_ceil(2), rules, stats, true)?;
         }
         Ok(Some(many.or(few)))
-    }
-
-    /// The better of an attempt and those that follow from it with poor places meshed anew.
-    fn improve_pieces(&self, first: Attempt, rules: Rules, stats: &QMorphStats) -> Result<Attempt, QMorphError> {
-        let most = (2 * self.params.attempts).div_ceil(3);
-        self.improve(self.reworked(first, rules)?, most, rules, stats, true)
     }
 
     /// An attempt from triangles that do not fold up.
@@ -158,9 +166,10 @@ impl Morpher<'_, '_> {
         let mut search = Search::new(first);
         for _ in 1..most {
             let places = search.places(rules);
-            if places.is_empty() {
+            if places.is_empty() || self.left.get() == 0 {
                 break;
             }
+            self.left.set(self.left.get() - 1);
             let mut mesh = search.from().triangles.clone();
             tighten(&mut mesh, ground, rules, &places, watch)?;
             let mut next = self.attempt(mesh, Some(search.from()), rules, stats)?;
@@ -202,6 +211,24 @@ impl Morpher<'_, '_> {
                 *attempt = before;
                 break;
             }
+        }
+        Ok(())
+    }
+
+    /// Takes out irregular vertices that rings and pieces left, where that costs nothing else.
+    fn tidy(&self, attempt: &mut Attempt, rules: Rules) -> Result<(), Cancelled> {
+        let (ground, watch) = (self.ground, self.watch);
+        watch.phase("cleaning up", None);
+        let before = attempt.clone();
+        let tolerances = [rules.tolerance, rules.curve_tolerance];
+        attempt.awake.fill(true);
+        attempt.stats.clean_edits += regularise(&mut attempt.quads, ground, tolerances, &attempt.awake, watch)?;
+        attempt.stats.clean_edits +=
+            finish(&mut attempt.quads, ground, rules.curve_tolerance, &attempt.awake, watch)?.edits;
+        self.settle(attempt, rules)?;
+        self.rework(attempt, rules)?;
+        if attempt.lack > before.lack {
+            *attempt = before;
         }
         Ok(())
     }

@@ -57,6 +57,22 @@ pub(super) struct Flaws {
     pub(super) crossing: Vec<u32>,
 }
 
+impl Flaws {
+    /// Those of some faces.
+    pub(super) fn within(&self, faces: &[u32]) -> Self {
+        let faults = self.faults.iter().filter(|fault| faces.contains(&fault.face)).copied().collect();
+        Self { faults, crossing: self.crossing.iter().copied().filter(|f| faces.contains(f)).collect() }
+    }
+
+    /// Puts others in the place of those of some faces.
+    pub(super) fn replace(&mut self, faces: &[u32], with: Self) {
+        self.faults.retain(|fault| !faces.contains(&fault.face));
+        self.crossing.retain(|f| !faces.contains(f));
+        self.faults.extend(with.faults);
+        self.crossing.extend(with.crossing);
+    }
+}
+
 impl Check {
     pub(super) fn new(ground: &Ground<'_>, watch: &Watch) -> Result<Self, Cancelled> {
         let surface = ground.surface;

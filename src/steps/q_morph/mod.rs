@@ -16,8 +16,9 @@
 //! The distance between triangles and surface is certified both ways first, and sizes are lowered where it is too large.
 //! The same is done with the finished quads: where they are too far away, single vertices are moved over the ridges and
 //! tips that a face cuts off (`settle`); where that is not enough, or shapes are poor, sizes are lowered there and the
-//! front runs again in the regions that changed (`attempts`, `search`), or in a small piece about the place, whose rim
-//! stays (`rework`, `patch`). Where quads pass through each other even then, all begins again from triangles that do not
+//! front runs again: first in a small piece about the place, whose rim stays, inside a region or across curves (`rework`,
+//! `patch`), or a ring of quads makes faces smaller there (`pillows`); only where that does not do, in the regions that
+//! change with the sizes (`attempts`, `search`). Where quads pass through each other even then, all begins again from triangles that do not
 //! fold up at the ends of limbs (`untangle`). The best that was reached is kept, and what is folded in it made flatter
 //! (`flatten`).
 //!
@@ -41,6 +42,7 @@ mod flatten;
 mod lack;
 mod midpoint;
 mod patch;
+mod pillows;
 mod reuse;
 mod rework;
 mod search;
@@ -98,9 +100,9 @@ pub struct QMorphParams {
     /// Whether there must be no triangle. Default true; false leaves one in each region with an odd number of border
     /// edges, and no curve gets an edge more for it.
     pub all_quad: bool,
-    /// How often the front may run where distance or shapes are not good enough: two thirds of it with small pieces about
-    /// poor places meshed anew, and where that does not do, so often over whole regions and half as often with pieces
-    /// again. Default 12; 1 takes what the first run gives.
+    /// How often the front may run over regions where distance or shapes are not good enough: two thirds of it with small
+    /// pieces about poor places meshed anew, and where that does not do, so often without and half as often with pieces
+    /// again; twice as often in all. Default 8; 1 takes what the first run gives.
     #[schemars(range(min = 1, max = 1000))]
     pub attempts: usize,
     /// The step fails before it begins if the result would have more faces. Default 20 million.
@@ -119,7 +121,7 @@ impl Default for QMorphParams {
             curve_tolerance: Length::Percent(0.1),
             border_angle: 30.0,
             all_quad: true,
-            attempts: 12,
+            attempts: 8,
             max_faces: 20_000_000,
         }
     }
@@ -303,7 +305,7 @@ pub struct Step;
 
 impl StepContract for Step {
     const NAME: &'static str = "q-morph";
-    const REVISION: u32 = 17;
+    const REVISION: u32 = 18;
     const INPUTS: &'static [InputDef] = &[InputDef {
         name: "from",
         accepts: &[Port::Surface],

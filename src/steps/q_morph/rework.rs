@@ -1,26 +1,51 @@
 //! Meshes small pieces of finished quads anew, where faces are poor or too far from the surface.
 //!
 //! A region is a lottery: one more row, and the front closes elsewhere. In a piece of few rings about a poor place the
-//! draw is cheap, and what is sound everywhere else stays. The first draw that makes the place better is kept.
+//! draw is cheap, and what is sound everywhere else stays. The first draw that makes the place better is kept. Where
+//! curves are the cause, whose vertices lie badly for what is beside them, the piece goes across them. Where no draw
+//! helps, faces get smaller there ([`pillows`](super::pillows)).
 
 use rustc_hash::FxHashSet;
 
-use super::check::{Check, Fault, Flaws};
+use super::check::{Check, Flaws};
 use super::flatten::{fold, unfold};
 use super::lack::{CROSSING, FAIR, excess, lack_of, shortfall};
-use super::patch::Patch;
+use super::patch::{Cuts, Draw, Patch};
 use super::settle::Settler;
 use crate::technique::ground::Ground;
 use crate::technique::isotropic::Rules;
 use crate::technique::mixed::Mixed;
 use crate::watch::{Cancelled, Watch};
 
-/// Rings about a place and the part of the sizes there, as tried for poor shapes.
+const fn inside(rings: usize, scale: f64) -> Draw {
+    Draw { rings, scale, across: None }
+}
+
+const fn across(rings: usize, scale: f64, cuts: Cuts) -> Draw {
+    Draw { rings, scale, across: Some(cuts) }
+}
+
+/// What is tried for poor shapes.
 ///
-/// More of them cost much and rarely help: on an armadillo nine of ten that succeed are among these.
-const FOR_SHAPE: [(usize, f64); 3] = [(2, 1.0), (3, 1.0), (4, 0.7)];
+/// More rings cost much and rarely help: on an armadillo nine of ten that succeed are among these.
+const FOR_SHAPE: [Draw; 12] = [
+    inside(2, 1.0),
+    inside(3, 1.0),
+    inside(4, 0.7),
+    across(2, 1.0, Cuts::None),
+    across(2, 0.7, Cuts::Near),
+    across(3, 0.7, Cuts::Near),
+    across(3, 1.0, Cuts::None),
+    across(4, 0.7, Cuts::Near),
+    across(5, 1.0, Cuts::Near),
+    across(3, 0.85, Cuts::None),
+    across(4, 1.0, Cuts::None),
+    inside(5, 1.0),
+];
 /// The same where faces are too far from the surface.
-const FOR_DISTANCE: [(usize, f64); 2] = [(2, 0.7), (3, 0.7)];
+const FOR_DISTANCE: [Draw; 2] = [inside(2, 0.7), inside(3, 0.7)];
+/// The same where they are folded.
+const FOR_FLATNESS: [Draw; 3] = [inside(2, 1.0), inside(3, 1.0), inside(4, 0.7)];
 /// Most places in one go.
 const PLACES: usize = 40;
 /// A draw must take away this part of what the place lacks.
@@ -35,7 +60,7 @@ pub(super) struct Rework<'a, 'g> {
     /// What places are at fault for.
     pub(super) aim: Aim,
     /// Patches that were drawn, by their sign and the part of the sizes: again, they would come out the same.
-    pub(super) drawn: FxHashSet<(u64, u64)>,
+    pub(super) drawn: FxHashSet<(u64, u64, Option<Cuts>)>,
 }
 
 /// What a rework is after.
@@ -64,7 +89,7 @@ impl Rework<'_, '_> {
                 continue;
             }
             tried += 1;
-            if self.mend(mesh, face, is_far, flaws)? {
+            if self.mend(mesh, face, is_far, flaws)? || self.pillow(mesh, face, flaws)? {
                 better += 1;
             } else {
                 // The patches of its neighbours are much the same.
@@ -98,7 +123,7 @@ impl Rework<'_, '_> {
     }
 
     /// How much some faces lack.
-    fn lack(&self, mesh: &Mixed, faces: &[u32], flaws: &Flaws) -> f64 {
+    pub(super) fn lack(&self, mesh: &Mixed, faces: &[u32], flaws: &Flaws) -> f64 {
         let folds: f64 = match self.aim {
             Aim::Sound => 0.0,
             Aim::Flat => faces.iter().map(|&f| fold(mesh, f, FOLDED)).sum(),
@@ -118,43 +143,53 @@ impl Rework<'_, '_> {
 
     /// Draws anew about a face until one draw is better. Whether one was.
     fn mend(&mut self, mesh: &mut Mixed, face: u32, is_far: bool, flaws: &mut Flaws) -> Result<bool, Cancelled> {
-        let tolerance = self.rules.tolerance;
-        let draws: &[(usize, f64)] = if is_far { &FOR_DISTANCE } else { &FOR_SHAPE };
-        for &(rings, scale) in draws {
-            let Some(patch) = Patch::around(mesh, face, rings) else { continue };
-            let before = within(flaws, &patch);
-            let lacked = self.lack(mesh, &patch.faces, &before);
-            if lacked == 0.0 {
-                return Ok(false);
+        let draws: &[Draw] = match self.aim {
+            Aim::Flat => &FOR_FLATNESS,
+            Aim::Sound if is_far => &FOR_DISTANCE,
+            Aim::Sound => &FOR_SHAPE,
+        };
+        for &draw in draws {
+            if let Some(patch) = Patch::around(mesh, face, draw)
+                && self.remake(mesh, &patch, draw, flaws)?
+            {
+                return Ok(true);
             }
-            if !self.drawn.insert((patch.sign(mesh), scale.to_bits())) {
-                continue;
-            }
-            let enough = (1.0 - GAIN) * lacked;
-            let sound = poorest(mesh, &patch.faces).min(FAIR);
-            let Some(remade) = self.draw(&patch, mesh, scale)? else { continue };
-            if self.lack(&remade, &remade.faces().collect::<Vec<_>>(), &Flaws::default()) >= enough {
-                continue;
-            }
-            mesh.begin();
-            if let Some(made) = patch.put_back(mesh, &remade) {
-                let after = self.check.flaws_near(mesh, tolerance, &made, self.watch)?;
-                let crosses = after.crossing.len() > before.crossing.len();
-                let spoils =
-                    self.aim == Aim::Flat && (after.faults.len() > before.faults.len() || poorest(mesh, &made) < sound);
-                if !crosses && !spoils && self.lack(mesh, &made, &after) < enough {
-                    mesh.commit();
-                    flaws.faults.retain(|fault| !patch.faces.contains(&fault.face));
-                    flaws.faults.extend(after.faults);
-                    flaws.crossing.retain(|f| !patch.faces.contains(f));
-                    flaws.crossing.extend(after.crossing);
-                    return Ok(true);
-                }
-            }
-            mesh.rollback();
         }
         Ok(false)
     }
+
+    /// Meshes a patch anew if that makes it better. Whether it did.
+    fn remake(&mut self, mesh: &mut Mixed, patch: &Patch, draw: Draw, flaws: &mut Flaws) -> Result<bool, Cancelled> {
+        let before = flaws.within(&patch.faces);
+        let enough = enough(self.lack(mesh, &patch.faces, &before));
+        if enough <= 0.0 || !self.drawn.insert((patch.sign(mesh), draw.scale.to_bits(), draw.across)) {
+            return Ok(false);
+        }
+        let sound = poorest(mesh, &patch.faces).min(FAIR);
+        let Some(remade) = self.draw(patch, mesh, draw.scale)? else { return Ok(false) };
+        if self.lack(&remade, &remade.faces().collect::<Vec<_>>(), &Flaws::default()) >= enough {
+            return Ok(false);
+        }
+        mesh.begin();
+        if let Some(made) = patch.put_back(mesh, &remade, self.ground, self.rules) {
+            let after = self.check.flaws_near(mesh, self.rules.tolerance, &made, self.watch)?;
+            let crosses = after.crossing.len() > before.crossing.len();
+            let spoils =
+                self.aim == Aim::Flat && (after.faults.len() > before.faults.len() || poorest(mesh, &made) < sound);
+            if !crosses && !spoils && self.lack(mesh, &made, &after) < enough {
+                mesh.commit();
+                flaws.replace(&patch.faces, after);
+                return Ok(true);
+            }
+        }
+        mesh.rollback();
+        Ok(false)
+    }
+}
+
+/// What a place that lacked so much must lack less than afterwards.
+pub(super) fn enough(lacked: f64) -> f64 {
+    (1.0 - GAIN) * lacked
 }
 
 /// The least quality of some faces.
@@ -166,13 +201,6 @@ fn poorest(mesh: &Mixed, faces: &[u32]) -> f64 {
 fn worst_first(mut places: Vec<(f64, u32, bool)>) -> Vec<(u32, bool)> {
     places.sort_by(|x, y| y.0.total_cmp(&x.0).then(x.1.cmp(&y.1)).then(x.2.cmp(&y.2)));
     places.into_iter().map(|(_, face, is_far)| (face, is_far)).collect()
-}
-
-/// The flaws of a patch's faces.
-fn within(flaws: &Flaws, patch: &Patch) -> Flaws {
-    let is_inside = |f: u32| patch.faces.contains(&f);
-    let faults: Vec<Fault> = flaws.faults.iter().filter(|fault| is_inside(fault.face)).copied().collect();
-    Flaws { faults, crossing: flaws.crossing.iter().copied().filter(|&f| is_inside(f)).collect() }
 }
 
 #[cfg(test)]
@@ -212,7 +240,11 @@ pub(super) mod tests {
         }
         let faces: Vec<_> = cells().map(Facet::Quad).collect();
         let soup = Soup { points: points.into(), faces: faces.into(), ..Soup::default() };
-        let mut mesh = Mixed::new(&soup, ground.places.clone(), vec![0; (N * N) as usize], |_, _| NONE).unwrap();
+        // Of the two triangles of a square the first tells the region.
+        let regions = (0..(N * N) as usize).map(|i| ground.regions[2 * i]).collect();
+        let workshop = ground.workshop().unwrap();
+        let arc = |a: VertexId, b: VertexId| workshop.find(a.raw(), b.raw()).map_or(NONE, |h| workshop.arc(h));
+        let mut mesh = Mixed::new(&soup, ground.places.clone(), regions, arc).unwrap();
         for v in 0..mesh.vertex_slots() {
             mesh.set_point(v, mesh.point(v), DVec3::Z);
             mesh.set_size(v, 1.0);
@@ -269,7 +301,7 @@ pub(super) mod tests {
             mesh.set_place(v, Place::Node);
         }
         for (face, rings) in (0..N * N).flat_map(|f| (1..5).map(move |rings| (f, rings))) {
-            let Some(patch) = Patch::around(&mesh, face, rings) else { continue };
+            let Some(patch) = Patch::around(&mesh, face, inside(rings, 1.0)) else { continue };
             let is_rim = |h: &u32| !patch.faces.contains(&mesh.face(h ^ 1));
             let sides = patch.faces.iter().flat_map(|&f| mesh.sides(f));
             let rim: Vec<(u32, u32)> = sides.filter(is_rim).map(|h| (mesh.origin(h), mesh.target(h))).collect();
@@ -299,10 +331,10 @@ pub(super) mod tests {
         let ground = Ground::new(&surface);
         let mut mesh = quads(&ground, &[]);
         let middle = 5 * N + 5;
-        assert!(Patch::around(&mesh, middle, 0).is_none(), "one face has nothing inside");
-        assert_eq!(Patch::around(&mesh, middle, 1).unwrap().faces.len(), 9);
+        assert!(Patch::around(&mesh, middle, inside(0, 1.0)).is_none(), "one face has nothing inside");
+        assert_eq!(Patch::around(&mesh, middle, inside(1, 1.0)).unwrap().faces.len(), 9);
         mesh.set_place(id(6, 6).raw(), Place::Node);
-        let beside = Patch::around(&mesh, middle, 1).unwrap().faces;
+        let beside = Patch::around(&mesh, middle, inside(1, 1.0)).unwrap().faces;
         assert_eq!(beside.len(), 8, "it goes round a vertex that must stay");
         assert!(!beside.contains(&(6 * N + 6)));
     }
