@@ -26,8 +26,6 @@ use crate::technique::join::{join_along_paths, join_neighbours};
 use crate::technique::mixed::Mixed;
 use crate::watch::{Cancelled, Watch};
 
-/// How many times the attempts asked for may follow in all, whatever is tried.
-const IN_ALL: usize = 2;
 /// How often poor places of an attempt are gone through.
 const REWORKS: usize = 2;
 /// How often sizes are lowered beforehand, where the triangles are too far from the surface.
@@ -50,7 +48,7 @@ pub(super) fn morph(
     let regions = ground.region_count();
     let stats = QMorphStats { regions, left_out: ground.left_out, attempts: 1, ..QMorphStats::default() };
     let check = Check::new(ground, watch)?;
-    let left = Cell::new(IN_ALL * params.attempts);
+    let left = Cell::new(2 * params.attempts);
     let work = Morpher { ground, params, check: &check, scale, watch, left };
     let mut begun = Vec::new();
     let Some(mut best) = work.attempts(rules, &stats, &mut begun)? else { return Err(QMorphError::Empty) };
@@ -61,6 +59,7 @@ pub(super) fn morph(
         if best.lack < BROKEN || params.attempts <= 1 || ground.curves.is_empty() {
             break;
         }
+        work.left.set(params.attempts);
         let Some(other) = work.attempts(rules, &stats, &mut begun)? else { continue };
         let attempts = best.stats.attempts + other.stats.attempts;
         if other.lack < best.lack {
@@ -85,7 +84,7 @@ struct Morpher<'a, 'g> {
     check: &'a Check,
     scale: f64,
     watch: &'a Watch,
-    /// How many more attempts may follow, in all.
+    /// How many more attempts there may be under the rules tried.
     left: Cell<usize>,
 }
 
@@ -112,6 +111,7 @@ impl Morpher<'_, '_> {
         }
         let mut few = self.reworked(first.clone(), rules)?;
         if !few.flaws.crossing.is_empty()
+            && self.left.get() > 0
             && let Some(other) = self.begin_untangled(rules, stats)?
         {
             let reworked = self.reworked(other.clone(), rules)?;
@@ -129,7 +129,10 @@ impl Morpher<'_, '_> {
         if many.is_better_than(&first) {
             many = self.improve(self.reworked(many, rules)?, most.div_ceil(2), rules, stats, true)?;
         }
-        Ok(Some(many.or(few)))
+        let mut best = many.or(few);
+        // Both count the first.
+        best.stats.attempts -= 1;
+        Ok(Some(best))
     }
 
     /// An attempt from triangles that do not fold up.
@@ -169,7 +172,6 @@ impl Morpher<'_, '_> {
             if places.is_empty() || self.left.get() == 0 {
                 break;
             }
-            self.left.set(self.left.get() - 1);
             let mut mesh = search.from().triangles.clone();
             tighten(&mut mesh, ground, rules, &places, watch)?;
             let mut next = self.attempt(mesh, Some(search.from()), rules, stats)?;
@@ -277,6 +279,7 @@ impl Morpher<'_, '_> {
         stats: &QMorphStats,
     ) -> Result<Option<Attempt>, Cancelled> {
         let (ground, watch) = (self.ground, self.watch);
+        self.left.set(self.left.get().saturating_sub(1));
         let mut stats = stats.clone();
         let mut quads = triangles.clone();
         if self.params.all_quad {

@@ -95,7 +95,7 @@ impl Check {
         Ok(Flaws { faults, crossing: self.crossing_all(mesh, watch)? })
     }
 
-    /// The flaws of some faces of one region, as they lie beside the others.
+    /// The flaws of some faces, as they lie beside the others.
     ///
     /// Time grows with what is near them; only finding that looks at every face.
     pub(super) fn flaws_near(

@@ -5,22 +5,22 @@
 //! remeshed with nearly equilateral triangles, and the number of border edges of each region made even. Then the front
 //! of Q-Morph turns triangles into quads ([`front`](crate::technique::front)), what it leaves is joined
 //! ([`join`](crate::technique::join)), and topology and shapes are cleaned: by edits of a few quads, and by cavities of
-//! up to 120 that are filled anew ([`clean_quads`](crate::technique::clean_quads)). All of it happens on the surface itself: angles are those of the
-//! triangles, and vertices go back onto the region they belong to.
+//! up to 120 that are filled anew ([`clean_quads`](crate::technique::clean_quads)). All of it happens on the surface
+//! itself: angles are those of the triangles, and vertices go back onto the region they belong to.
 //!
 //! Based on: R. Miyazaki, K. Harada. Transformation of a closed 3D triangular mesh to a quadrilateral mesh based on
 //! feature edges; S. J. Owen, M. L. Staten, S. A. Canann, S. Saigal. Advancing front quadrilateral meshing using triangle
 //! transformations. 7th International Meshing Roundtable, 1998. The cavities: G. Bunin. Non-local topological clean-up.
 //! 15th International Meshing Roundtable, 2006.
 //!
-//! The distance between triangles and surface is certified both ways first, and sizes are lowered where it is too large.
-//! The same is done with the finished quads: where they are too far away, single vertices are moved over the ridges and
-//! tips that a face cuts off (`settle`); where that is not enough, or shapes are poor, sizes are lowered there and the
-//! front runs again: first in a small piece about the place, whose rim stays, inside a region or across curves (`rework`,
-//! `patch`), or a ring of quads makes faces smaller there (`pillows`); only where that does not do, in the regions that
-//! change with the sizes (`attempts`, `search`). Where quads pass through each other even then, all begins again from triangles that do not
-//! fold up at the ends of limbs (`untangle`). The best that was reached is kept, and what is folded in it made flatter
-//! (`flatten`).
+//! The distance between triangles and surface is certified both ways first, and sizes are lowered where it is too
+//! large. The same is done with the finished quads: where they are too far away, single vertices are moved over the
+//! ridges and tips that a face cuts off (`settle`); where that is not enough, or shapes are poor, sizes are lowered
+//! there and the front runs again: first in a small piece about the place, whose rim stays, inside a region or across
+//! curves (`rework`, `patch`), or a ring of quads makes faces smaller there (`pillows`); only where that does not do,
+//! in the regions that change with the sizes (`attempts`, `search`). Where quads pass through each other even then, all
+//! begins again from triangles that do not fold up at the ends of limbs (`untangle`). The best that was reached is
+//! kept, and what is folded in it made flatter (`flatten`).
 //!
 //! # Invariants
 //! - Curves stay chains of edges between the same nodes, and nodes stay where they are; borders of regions that
@@ -102,7 +102,7 @@ pub struct QMorphParams {
     pub all_quad: bool,
     /// How often the front may run over regions where distance or shapes are not good enough: two thirds of it with small
     /// pieces about poor places meshed anew, and where that does not do, so often without and half as often with pieces
-    /// again; twice as often in all. Default 8; 1 takes what the first run gives.
+    /// again; in all, with what begins otherwise, at most four times as often. Default 8; 1 takes what the first run gives.
     #[schemars(range(min = 1, max = 1000))]
     pub attempts: usize,
     /// The step fails before it begins if the result would have more faces. Default 20 million.
@@ -151,7 +151,7 @@ pub struct QMorphStats {
     pub seams: usize,
     /// Edits of the clean-up.
     pub clean_edits: usize,
-    /// Pieces of quads that were meshed anew.
+    /// Pieces of quads that were meshed anew, and rings put in.
     pub reworked: usize,
     /// Least scaled Jacobian.
     pub min_scaled_jacobian: f64,

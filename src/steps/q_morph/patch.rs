@@ -29,6 +29,8 @@ pub(super) struct Patch {
     rim: Vec<u32>,
     /// The edges on curves inside that are to be cut in three.
     cuts: Vec<u32>,
+    /// A number for the face that tells which are.
+    seed: u64,
 }
 
 /// How a patch is meshed anew.
@@ -38,6 +40,8 @@ pub(super) struct Draw {
     pub(super) rings: usize,
     /// The part of the sizes there.
     pub(super) scale: f64,
+    /// Below this nothing is made smaller.
+    pub(super) floor: f64,
     /// Whether the patch goes across curves, and whether long edges on those are cut.
     pub(super) across: Option<Cuts>,
 }
@@ -77,8 +81,7 @@ impl Patch {
         Self::of(mesh, disk, Vec::new())
     }
 
-    /// The same across curves. `None` where it meets none, or has a region in several pieces: of those each would have to
-    /// be made even.
+    /// The same across curves. `None` where it meets none, or has a region in several pieces, which could come together.
     fn across(mesh: &Mixed, face: u32, draw: Draw) -> Option<Self> {
         let mut disk = Disk::across(mesh, face);
         let mut last = 0..1;
@@ -92,24 +95,25 @@ impl Patch {
             return None;
         }
         let cuts = match draw.across {
-            Some(Cuts::Near) => long_edges(mesh, &disk, face),
+            Some(Cuts::Near) => long_edges(mesh, &disk, face, draw.floor),
             _ => Vec::new(),
         };
         if cuts.is_empty() && draw.across == Some(Cuts::Near) {
             return None;
         }
-        Self::of(mesh, disk, cuts)
+        let seed = if cuts.is_empty() { 0 } else { sign(mesh, face) };
+        Self::of(mesh, disk, cuts).map(|patch| Self { seed, ..patch })
     }
 
     fn of(mesh: &Mixed, disk: Disk, cuts: Vec<u32>) -> Option<Self> {
         let mut rim = disk.rim(mesh);
         rim.sort_unstable();
-        (disk.faces.len() > 1).then_some(Self { faces: disk.faces, rim, cuts })
+        (disk.faces.len() > 1).then_some(Self { faces: disk.faces, rim, cuts, seed: 0 })
     }
 
-    /// A number for its faces as they lie, that is another one when they change.
+    /// A number for its faces as they lie and what is cut, that is another one when they change.
     pub(super) fn sign(&self, mesh: &Mixed) -> u64 {
-        self.faces.iter().fold(0, |sum, &f| sum.wrapping_add(sign(mesh, f)))
+        self.faces.iter().fold(self.seed, |sum, &f| sum.wrapping_add(sign(mesh, f)))
     }
 
     /// Quads for the patch, with sizes inside times `scale`: a mesh of its own that begins with the vertices of the rim.
@@ -169,13 +173,17 @@ impl Patch {
         soup.points = list.iter().map(|&v| mesh.point(v)).collect::<Vec<_>>().into();
         let place = |i: usize| if i < self.rim.len() { Place::Node } else { mesh.place(list[i]) };
         let places = (0..list.len()).map(place).collect();
-        let arc = |a: VertexId, b: VertexId| mesh.find(list[a.index()], list[b.index()]).map_or(NONE, |h| mesh.arc(h));
+        let is_ours = |h: &u32| [h, &(h ^ 1)].iter().any(|&&k| self.faces.contains(&mesh.face(k)));
+        let arc = |a: VertexId, b: VertexId| {
+            mesh.find(list[a.index()], list[b.index()]).filter(is_ours).map_or(NONE, |h| mesh.arc(h))
+        };
         let mut patch = Mixed::new(&soup, places, regions, arc)?;
         let largest = list.iter().map(|&v| mesh.size(v)).fold(0.0, f64::max);
         let spans_curves = patch.edges().any(|h| patch.arc(h) != NONE && !is_rim(&patch, h));
         for (i, &v) in list.iter().enumerate() {
             patch.set_point(i as u32, mesh.point(v), mesh.normal(v));
-            patch.set_size(i as u32, scale * if spans_curves { mesh.size(v) } else { largest });
+            let size = if spans_curves { mesh.size(v) } else { largest };
+            patch.set_size(i as u32, (scale * size).max(rules.floor.min(size)));
         }
         for i in 0..self.rim.len() as u32 {
             let (sum, n) = patch
@@ -207,9 +215,11 @@ impl Patch {
         if self.doubles_an_edge(mesh, patch, &number) {
             return None;
         }
-        let on_curves: Vec<u32> =
-            self.faces.iter().flat_map(|&f| mesh.sides(f)).filter(|&h| mesh.arc(h) != NONE).collect();
-        let most = on_curves.into_iter().map(|h| sag(mesh, ground, h)).fold(rules.curve_tolerance, f64::max);
+        let mut sags: FxHashMap<u32, f64> = FxHashMap::default();
+        for h in self.faces.iter().flat_map(|&f| mesh.sides(f)).filter(|&h| mesh.arc(h) != NONE) {
+            let most = sags.entry(mesh.arc(h)).or_insert(rules.curve_tolerance);
+            *most = most.max(sag(mesh, ground, h));
+        }
         let mut new: Vec<Corners> = Vec::new();
         for f in patch.faces() {
             let mut corners: Corners = smallvec![];
@@ -224,11 +234,12 @@ impl Patch {
         for (&f, from) in made.iter().zip(patch.faces()) {
             mesh.set_region(f, patch.region(from));
         }
-        for h in patch.edges().filter(|&h| patch.arc(h) != NONE && !is_rim(patch, h)) {
+        for h in patch.edges().filter(|&h| !is_rim(patch, h)) {
             let k = mesh.find(number[&patch.origin(h)], number[&patch.target(h)])?;
-            mesh.set_arc(k, patch.arc(h));
+            let arc = patch.arc(h);
+            mesh.set_arc(k, arc);
             // In the patch nobody knew where the curve goes on beyond the rim.
-            if sag(mesh, ground, k) > most {
+            if arc != NONE && sag(mesh, ground, k) > sags.get(&arc).map_or(rules.curve_tolerance, |&most| most) {
                 return None;
             }
         }
@@ -253,11 +264,13 @@ fn sag(mesh: &Mixed, ground: &Ground<'_>, h: u32) -> f64 {
     ground.curves[mesh.arc(h) as usize].sag(a.min(b), a.max(b))
 }
 
-/// The edges on curves inside a disk near a face that are not much shorter than its longest side.
-fn long_edges(mesh: &Mixed, disk: &Disk, face: u32) -> Vec<u32> {
+/// The edges on curves inside a disk near a face that are not much shorter than its longest side, and whose thirds are not
+/// below `floor`.
+fn long_edges(mesh: &Mixed, disk: &Disk, face: u32, floor: f64) -> Vec<u32> {
     let longest = mesh.sides(face).map(|h| mesh.length(h)).fold(0.0, f64::max);
     let is_inner = |h: u32| disk.contains(mesh.face(h)) && disk.contains(mesh.face(h ^ 1));
-    let is_long = |h: u32| mesh.arc(h) != NONE && is_inner(h) && mesh.length(h) >= LONG * longest;
+    let least = (LONG * longest).max(3.0 * floor);
+    let is_long = |h: u32| mesh.arc(h) != NONE && is_inner(h) && mesh.length(h) >= least;
     let near = mesh.faces_around(&mesh.corners(face));
     let mut long: Vec<u32> = near.iter().flat_map(|&f| mesh.sides(f)).filter(|&h| is_long(h)).map(|h| h & !1).collect();
     long.sort_unstable();
@@ -315,7 +328,7 @@ mod tests {
     }
 
     fn draw(rings: usize, scale: f64, cuts: Cuts) -> Draw {
-        Draw { rings, scale, across: Some(cuts) }
+        Draw { rings, scale, floor: 0.1, across: Some(cuts) }
     }
 
     #[test]
@@ -356,7 +369,7 @@ mod tests {
         let ground = Ground::new(&surface);
         let mesh = quads(&ground, &[]);
         assert!(Patch::around(&mesh, 5 * N + 1, draw(2, 1.0, Cuts::None)).is_none(), "it meets no curve");
-        let inside = Patch::around(&mesh, 5 * N + 5, Draw { rings: 3, scale: 1.0, across: None }).unwrap();
+        let inside = Patch::around(&mesh, 5 * N + 5, Draw { rings: 3, scale: 1.0, floor: 0.1, across: None }).unwrap();
         assert!(inside.faces.iter().all(|&f| mesh.centre(f).x > 5.0));
     }
 }

@@ -8,7 +8,7 @@ use crate::technique::clean_quads::pillow;
 use crate::technique::mixed::{Mixed, NONE};
 use crate::watch::Cancelled;
 
-/// Longest sides below this multiple of the least size are not cut.
+/// Longest sides below this multiple of the floor of sizes are not cut.
 const LEAST: f64 = 2.0;
 
 impl Rework<'_, '_> {
@@ -49,9 +49,12 @@ impl Rework<'_, '_> {
         let corners: Vec<u32> = faces.iter().flat_map(|&f| mesh.corners(f)).collect();
         let old = mesh.faces_around(&corners);
         let before = flaws.within(&old);
-        let lacked = self.lack(mesh, &old, &before);
+        let (lacked, least) = (self.lack(mesh, &old, &before), shortest(mesh, &old));
         let Some(touched) = pillow(mesh, self.ground, self.rules.curve_tolerance, faces) else { return Ok(None) };
         let made = mesh.faces_around(&touched);
+        if shortest(mesh, &made) < self.rules.floor.min(least) {
+            return Ok(None);
+        }
         let enough = enough(lacked);
         if self.lack(mesh, &made, &Flaws::default()) >= enough {
             return Ok(None);
@@ -61,6 +64,12 @@ impl Rework<'_, '_> {
         let gains = after.crossing.len() <= before.crossing.len() && lacks < enough;
         Ok(gains.then_some((lacked - lacks, old, after)))
     }
+}
+
+/// The length of the shortest side of some faces.
+fn shortest(mesh: &Mixed, faces: &[u32]) -> f64 {
+    let sides = faces.iter().flat_map(|&f| mesh.sides(f));
+    sides.map(|h| mesh.length(h)).fold(f64::INFINITY, f64::min)
 }
 
 /// Sets of faces about one: itself, with one neighbour, the faces at a corner, at both ends of a side, at all corners.

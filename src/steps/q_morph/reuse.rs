@@ -20,7 +20,7 @@ pub(super) struct Attempt {
     pub(super) triangles: Mixed,
     /// A number for the even triangles of each region.
     pub(super) signs: Vec<u64>,
-    /// Whether it made each region; the others are taken over.
+    /// Whether it made each region; the others are taken over. Pieces across curves and rings change those too.
     pub(super) awake: Vec<bool>,
     /// The finished quads.
     pub(super) quads: Mixed,
@@ -116,21 +116,33 @@ pub(super) fn take_over(
     Some((glued, awake))
 }
 
-/// For each vertex of `mesh` on the border of a region at rest the vertex of `quads` in its place. Regions whose curves
-/// do not fit are woken.
+/// For each vertex of `mesh` on the border of a region at rest the vertex of `quads` in its place. Regions at rest whose
+/// curves do not fit those of regions awake are woken: quads made smaller have more vertices on curves than triangles.
 fn same_vertices(mesh: &Mixed, quads: &Mixed, ground: &Ground<'_>, awake: &mut [bool]) -> FxHashMap<u32, u32> {
     let (new, old) = (chains(mesh, ground), chains(quads, ground));
-    for (arc, sides) in ground.beside.iter().enumerate() {
-        if new[arc].len() != old[arc].len() {
-            for &region in sides.iter().filter(|&&region| region != NONE) {
-                awake[region as usize] = true;
-            }
+    let is = |region: u32, state: bool, awake: &[bool]| region != NONE && awake[region as usize] == state;
+    let fits = |arc: usize| new[arc].len() == old[arc].len();
+    // One that wakes has other curves.
+    loop {
+        let is_torn =
+            |sides: &[u32; 2]| [true, false].into_iter().all(|state| sides.iter().any(|&r| is(r, state, awake)));
+        let torn = (0..new.len()).find(|&arc| !fits(arc) && is_torn(&ground.beside[arc]));
+        let Some(arc) = torn else { break };
+        for &region in ground.beside[arc].iter().filter(|&&region| region != NONE) {
+            awake[region as usize] = true;
         }
     }
     let mut same = FxHashMap::default();
     for (arc, sides) in ground.beside.iter().enumerate() {
-        if sides.iter().any(|&region| region != NONE && !awake[region as usize]) {
+        if !sides.iter().any(|&region| is(region, false, awake)) {
+            continue;
+        }
+        if fits(arc) {
             same.extend(new[arc].iter().zip(&old[arc]).map(|(&(_, v), &(_, w))| (v, w)));
+        } else {
+            // Between regions at rest: others know only its ends.
+            let ends = [(new[arc].first(), old[arc].first()), (new[arc].last(), old[arc].last())];
+            same.extend(ends.into_iter().filter_map(|(new, old)| Some((new?.1, old?.1))));
         }
     }
     same

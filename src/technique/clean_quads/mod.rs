@@ -18,7 +18,8 @@
 //!
 //! # Invariants
 //! - Curves and nodes stay; only curve vertices slide along their curve.
-//! - No commit makes the least scaled Jacobian of its neighbourhood worse unless it stays above a bound.
+//! - No commit makes the least scaled Jacobian of its neighbourhood worse unless it stays above a bound; rings are put
+//!   within a transaction of the caller, who judges them.
 //!
 //! # Cost
 //! O(vertices) a pass; passes stop when nothing gains. A cavity costs O(faces) to grow, times the rows looked for across

@@ -75,7 +75,7 @@ impl Cleaner<'_, '_> {
         let crossed = self.inner_arcs(faces, &inside);
         let (mut moved, mut stubs) = (FxHashMap::default(), Vec::new());
         for shifted in &ring {
-            let copy = self.shifted(shifted, &inside);
+            let copy = self.shifted(shifted, &inside)?;
             moved.insert(shifted.vertex, copy);
             stubs.extend(shifted.curve.map(|h| (shifted.vertex, copy, self.mesh.arc(h))));
         }
@@ -113,8 +113,8 @@ impl Cleaner<'_, '_> {
         on_curve.map(|h| (self.mesh.origin(h), self.mesh.target(h), self.mesh.arc(h))).collect()
     }
 
-    /// A vertex of the rim where it goes.
-    fn shifted(&mut self, shifted: &Shifted, inside: &FxHashSet<u32>) -> u32 {
+    /// A vertex of the rim where it goes; `None` where that is on another side of the body.
+    fn shifted(&mut self, shifted: &Shifted, inside: &FxHashSet<u32>) -> Option<u32> {
         let mesh = &*self.mesh;
         let (v, size) = (shifted.vertex, mesh.size(shifted.vertex));
         if let Some(h) = shifted.curve {
@@ -122,7 +122,7 @@ impl Cleaner<'_, '_> {
             let [from, to] = self.ground.ends_on(mesh, h);
             let at = from + ALONG * (to - from);
             let point = self.ground.curves[arc as usize].at(at);
-            return self.mesh.add_vertex(point, glam::DVec3::ZERO, Place::Arc { arc, at }, size);
+            return Some(self.mesh.add_vertex(point, glam::DVec3::ZERO, Place::Arc { arc, at }, size));
         }
         let (mut sum, mut n) = (glam::DVec3::ZERO, 0.0);
         for f in mesh.faces_at(v).filter(|f| inside.contains(f)) {
@@ -132,6 +132,7 @@ impl Cleaner<'_, '_> {
         let region = mesh.region(mesh.face(shifted.side));
         let start = mesh.point(v);
         let foot = self.ground.project_from(region, start.lerp(sum / n, INWARDS), start);
-        self.mesh.add_vertex(foot.point, foot.normal, Place::Region(region), size)
+        let is_near = self.is_near(v, foot.normal);
+        is_near.then(|| self.mesh.add_vertex(foot.point, foot.normal, Place::Region(region), size))
     }
 }

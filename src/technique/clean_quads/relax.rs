@@ -100,7 +100,7 @@ impl Cleaner<'_, '_> {
     }
 
     /// Whether a normal is one of the same side of the body as the vertex is on.
-    fn is_near(&self, v: u32, normal: DVec3) -> bool {
+    pub(super) fn is_near(&self, v: u32, normal: DVec3) -> bool {
         let now = self.mesh.normal(v);
         now == DVec3::ZERO || normal.dot(now) >= 0.5
     }

@@ -200,10 +200,11 @@ impl Remesher<'_, '_> {
         for (arc, chain) in chains(self.mesh, self.ground).into_iter().enumerate() {
             let sleeps = |&region: &u32| region != NONE && !awake[region as usize];
             let curve = &self.ground.curves[arc];
-            // In a piece of a mesh there may be a piece of the curve only.
+            // In a piece of a mesh there may be a piece of the curve only, or vertices of its rim that lie on the curve.
             let is_whole = |chain: &[(f64, u32)]| {
                 let ends = [chain[0].1, chain[chain.len() - 1].1].map(|v| self.mesh.point(v));
                 ends == [curve.points[0], curve.points[curve.points.len() - 1]]
+                    && chain.windows(2).all(|pair| pair[0].0 < pair[1].0)
             };
             if chain.len() < 3 || self.ground.beside[arc].iter().any(sleeps) || !is_whole(&chain) {
                 continue;
