@@ -203,11 +203,6 @@ impl Format {
         self != Self::Off
     }
 
-    /// The format with this name in recipes.
-    pub fn from_name(name: &str) -> Option<Self> {
-        Self::ALL.iter().copied().find(|f| f.name() == name)
-    }
-
     /// The format that the ending of a file name tells, in any case.
     pub fn from_file_name(file_name: &str) -> Option<Self> {
         let (_, ending) = file_name.rsplit_once('.')?;

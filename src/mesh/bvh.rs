@@ -259,33 +259,6 @@ impl<P: Primitive> Bvh<P> {
         ControlFlow::Continue(())
     }
 
-    /// Calls `visit` with every primitive of this and every one of `other` whose boxes meet, until it breaks.
-    pub fn for_each_pair<Q: Primitive>(
-        &self,
-        other: &Bvh<Q>,
-        mut visit: impl FnMut(u32, u32) -> ControlFlow<()>,
-    ) -> ControlFlow<()> {
-        let mut stack: Vec<(u32, u32)> = Vec::new();
-        if !self.nodes.is_empty() && !other.nodes.is_empty() {
-            stack.push((0, 0));
-        }
-        while let Some((a, b)) = stack.pop() {
-            let (left, right) = (self.nodes[a as usize], other.nodes[b as usize]);
-            if !left.bounds.overlaps(&right.bounds) {
-                continue;
-            }
-            let split_left = right.count > 0 || left.bounds.half_area() >= right.bounds.half_area();
-            if left.count > 0 && right.count > 0 {
-                self.leaf_pairs(other, (left, right), false, &mut |i, j| visit(i, j))?;
-            } else if left.count == 0 && split_left {
-                stack.extend([(left.first, b), (left.first + 1, b)]);
-            } else {
-                stack.extend([(a, right.first), (a, right.first + 1)]);
-            }
-        }
-        ControlFlow::Continue(())
-    }
-
     /// The pairs between two leaves; `same` for one leaf with itself.
     fn leaf_pairs<Q: Primitive>(
         &self,

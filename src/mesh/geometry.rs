@@ -167,22 +167,6 @@ pub fn triangle_angles([a, b, c]: [DVec3; 3]) -> [f64; 3] {
     [angle(b - a, c - a), angle(c - b, a - b), angle(a - c, b - c)]
 }
 
-/// The angle between the normals of two faces in radians: 0 when flat, π when folded; `None` where a face has no area.
-///
-/// The faces must be oriented alike; the sharpness of an edge, in degrees, is what feature thresholds mean.
-pub fn dihedral_angle(left: [DVec3; 3], right: [DVec3; 3]) -> Option<f64> {
-    Some(angle(triangle_normal(left)?, triangle_normal(right)?))
-}
-
-/// The centre of the circle through the corners; `None` when the triangle has no area.
-pub fn circumcentre([a, b, c]: [DVec3; 3]) -> Option<DVec3> {
-    let (u, v) = (b - a, c - a);
-    let normal = u.cross(v);
-    let squared = normal.length_squared();
-    let offset = (v.length_squared() * normal.cross(u) + u.length_squared() * v.cross(normal)) / (2.0 * squared);
-    (squared > 0.0 && offset.is_finite()).then(|| a + offset)
-}
-
 /// The centroid of a triangle.
 #[inline]
 pub fn centroid([a, b, c]: [DVec3; 3]) -> DVec3 {
@@ -273,7 +257,6 @@ mod tests {
         near(stretch(RIGHT), 12.0_f64.sqrt() / 5.0);
         near(aspect_ratio(RIGHT), 3.0_f64.sqrt() / 2.0 * 5.0 / 2.4);
         near(triangle_angles(RIGHT).iter().sum::<f64>(), std::f64::consts::PI);
-        assert_eq!(circumcentre(RIGHT), Some(dvec3(1.5, 2.0, 0.0)));
         assert_eq!(triangle_normal(RIGHT), Some(DVec3::Z));
     }
 
@@ -290,7 +273,6 @@ mod tests {
         assert_eq!(stretch(t), 0.0);
         assert_eq!(aspect_ratio(t), f64::INFINITY);
         assert_eq!(triangle_normal(t), None);
-        assert_eq!(circumcentre(t), None);
         assert_eq!(stretch([DVec3::ONE; 3]), 0.0);
     }
 

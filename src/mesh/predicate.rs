@@ -303,18 +303,6 @@ pub fn segment_triangle(segment: [DVec3; 2], corners: [DVec3; 3]) -> bool {
     !is_degenerate(corners) && segment_hits(segment, sides, corners)
 }
 
-/// Whether two closed segments in the plane have a common point.
-pub fn segment_segment_2d([a, b]: [DVec2; 2], [c, d]: [DVec2; 2]) -> bool {
-    let (sc, sd, sa, sb) = (orient2d(a, b, c), orient2d(a, b, d), orient2d(c, d, a), orient2d(c, d, b));
-    if [sa, sb, sc, sd] == [0; 4] {
-        // All on one line: compare the extents.
-        let (lo, hi) = (a.min(b), a.max(b));
-        let (lo2, hi2) = (c.min(d), c.max(d));
-        return lo.cmple(hi2).all() && lo2.cmple(hi).all();
-    }
-    sc * sd <= 0 && sa * sb <= 0
-}
-
 /// Triangles in one plane, their first `shared` corners equal.
 fn coplanar(mut a: [DVec2; 3], mut b: [DVec2; 3], shared: usize) -> Meeting {
     for t in [&mut a, &mut b] {

@@ -51,26 +51,18 @@ proptest! {
 
     #[test]
     fn boxes_and_pairs_are_those_of_all(all in triangles(), other in triangles()) {
-        let (bvh, bvh2) = (Bvh::new(all.clone()), Bvh::new(other.clone()));
+        let bvh = Bvh::new(all.clone());
         let meet = |i: usize, j: usize, b: &[Triangle]| all[i].bounds().overlaps(&b[j].bounds());
         let mut pairs = Vec::new();
         let _ = bvh.for_each_self_pair(|i, j| { pairs.push((i, j)); ControlFlow::Continue(()) });
         pairs.sort_unstable();
         let mut expected = Vec::new();
-        let mut cross = Vec::new();
         for i in 0..all.len() {
             for j in i + 1..all.len() {
                 if meet(i, j, &all) { expected.push((i as u32, j as u32)); }
             }
-            for j in 0..other.len() {
-                if meet(i, j, &other) { cross.push((i as u32, j as u32)); }
-            }
         }
         prop_assert_eq!(pairs, expected);
-        let mut found = Vec::new();
-        let _ = bvh.for_each_pair(&bvh2, |i, j| { found.push((i, j)); ControlFlow::Continue(()) });
-        found.sort_unstable();
-        prop_assert_eq!(found, cross);
         if let Some(first) = other.first() {
             let inside: Vec<u32> = (0..all.len() as u32).filter(|&i| meet(i as usize, 0, &other)).collect();
             prop_assert_eq!(bvh.in_box(&first.bounds()), inside);

@@ -88,10 +88,6 @@ fn segments_and_triangles() {
     assert!(segment_triangle([dvec3(-1.0, 1.0, 0.0), dvec3(9.0, 1.0, 0.0)], A));
     assert!(!segment_triangle([dvec3(3.0, 3.0, -1.0), dvec3(3.0, 3.0, 1.0)], A));
     assert!(!segment_triangle([dvec3(1.0, 1.0, 1.0), dvec3(1.0, 1.0, 2.0)], A));
-    let s = |a: [f64; 2], b: [f64; 2]| [dvec2(a[0], a[1]), dvec2(b[0], b[1])];
-    assert!(segment_segment_2d(s([0.0, 0.0], [2.0, 0.0]), s([1.0, 0.0], [3.0, 0.0])));
-    assert!(!segment_segment_2d(s([0.0, 0.0], [2.0, 0.0]), s([3.0, 0.0], [4.0, 0.0])));
-    assert!(segment_segment_2d(s([0.0, 0.0], [2.0, 0.0]), s([1.0, 0.0], [1.0, 1.0])));
 }
 
 /// Whether two triangles have a common point, by the definition: all edges of each against the other.

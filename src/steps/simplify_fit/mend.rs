@@ -12,7 +12,7 @@ use super::surfaces::Surfaces;
 use crate::mesh::geometry::angle;
 use crate::mesh::halfedge::{HalfedgeMesh, edge_of};
 use crate::mesh::{EdgeId, FaceId, Freedom, HalfedgeId, VertexId};
-use crate::technique::collapse::session::best_stretch_at;
+use crate::metric::shape::best_stretch_with_angle;
 use crate::technique::collapse::{CollapseRules, Editor, Order, Priority};
 use crate::technique::remesh::{
     Gain, Refusals, faces_below, flip_edges, raise_stretch, relax_vertices, towards_centroid,
@@ -139,7 +139,7 @@ fn is_wedge(bench: &Bench<'_, '_>, f: FaceId, limit: f64) -> bool {
         let is_curve = |h: HalfedgeId| mesh.edge_freedom(edge_of(h)) != Freedom::Free;
         let at = mesh.point(mesh.origin(out));
         let opening = angle(mesh.point(mesh.target(out)) - at, mesh.point(mesh.origin(back)) - at);
-        is_curve(out) && is_curve(back) && opening < 0.5 && best_stretch_at(opening) < limit
+        is_curve(out) && is_curve(back) && opening < 0.5 && best_stretch_with_angle(opening) < limit
     })
 }
 

@@ -14,7 +14,7 @@ use super::placement::{Order, Site};
 use super::priority::{Priority, Tally};
 use super::quadrics::Quadrics;
 use super::star::{Bounds, HAS_NORMAL, LEAST_TURN_COSINE, Shape, Star};
-use crate::mesh::edit::{CollapsePlan, Placement, check_collapse, collapse};
+use crate::mesh::edit::{CollapsePlan, check_collapse, collapse};
 use crate::mesh::geometry::{area_vector, stretch, triangle_size};
 use crate::mesh::halfedge::{HalfedgeMesh, edge_of, twin};
 use crate::mesh::{EdgeId, FaceId, Freedom, VertexId};
@@ -457,10 +457,5 @@ impl<'a> Editor<'a> {
     pub(in crate::technique) fn quadrics_admit(&self, v: VertexId, p: DVec3) -> bool {
         let (planes, lines) = (self.quadrics.planes(v), self.quadrics.lines(v));
         self.keeper.admits_point(planes, &lines, p - self.quadrics.origin)
-    }
-
-    /// Whether the collapse of an edge may place its vertex anywhere.
-    pub fn is_free_edge(&self, edge: EdgeId) -> bool {
-        check_collapse(&self.mesh, edge).is_ok_and(|plan| plan.placement == Placement::Anywhere)
     }
 }

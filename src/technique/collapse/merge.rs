@@ -35,13 +35,6 @@ enum Kind {
     Face(MergeFacePlan),
 }
 
-impl Merge {
-    /// Least stretch of the star as it is.
-    pub fn stretch_before(&self) -> f64 {
-        self.before.stretch_min
-    }
-}
-
 impl Editor<'_> {
     /// How the ends of an edge may become one.
     pub fn plan_edge(&mut self, edge: EdgeId, rules: &CollapseRules) -> Option<Merge> {

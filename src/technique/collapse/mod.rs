@@ -33,7 +33,7 @@ pub mod priority;
 pub mod quadrics;
 mod queue;
 pub mod session;
-mod star;
+pub(in crate::technique) mod star;
 mod target;
 
 use queue::Queue;

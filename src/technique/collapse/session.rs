@@ -16,6 +16,7 @@ use crate::mesh::bvh::TriangleBvh;
 use crate::mesh::geometry::{Aabb, angle, stretch, triangle_size};
 use crate::mesh::halfedge::{EnterError, HalfedgeMesh};
 use crate::mesh::{FaceId, Freedom, IdVec, ResolvedFreedom, Surface, VertexId, edge_key};
+use crate::metric::shape::best_stretch_with_angle;
 
 /// What a tolerance means.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -227,11 +228,6 @@ fn valences(surface: &Surface) -> IdVec<crate::mesh::id::Vertex, usize> {
     valences
 }
 
-/// The stretch of the isosceles triangle with this angle at its apex: no triangle with so small an angle has more.
-pub fn best_stretch_at(apex: f64) -> f64 {
-    12.0_f64.sqrt() * 0.5 * libm::sin(apex) / (1.0 + libm::sin(0.5 * apex))
-}
-
 /// Why a face is below a stretch.
 pub fn cause(surface: &Surface, freedom: &ResolvedFreedom, f: FaceId, threshold: f64) -> Cause {
     let corners = surface.faces[f];
@@ -239,7 +235,7 @@ pub fn cause(surface: &Surface, freedom: &ResolvedFreedom, f: FaceId, threshold:
         let (v, a, b) = (corners[at], corners[(at + 1) % 3], corners[(at + 2) % 3]);
         let is_curve = |w| freedom.edge(edge_key(v, w)) != Freedom::Free;
         let opening = angle(surface.points[a] - surface.points[v], surface.points[b] - surface.points[v]);
-        if is_curve(a) && is_curve(b) && opening < 0.5 && best_stretch_at(opening) < threshold {
+        if is_curve(a) && is_curve(b) && opening < 0.5 && best_stretch_with_angle(opening) < threshold {
             return Cause::CurvesMeet { degrees: opening.to_degrees() };
         }
     }
@@ -252,7 +248,7 @@ mod tests {
 
     #[test]
     fn the_threshold_of_a_fifth_is_seven_degrees() {
-        assert!(best_stretch_at(7.08_f64.to_radians()) > 0.2);
-        assert!(best_stretch_at(7.0_f64.to_radians()) < 0.2);
+        assert!(best_stretch_with_angle(7.08_f64.to_radians()) > 0.2);
+        assert!(best_stretch_with_angle(7.0_f64.to_radians()) < 0.2);
     }
 }

@@ -13,10 +13,10 @@ use crate::mesh::halfedge::{HalfedgeMesh, twin};
 use crate::mesh::{FaceId, HalfedgeId, VertexId};
 
 /// Faces may turn by at most 45 degrees in one edit.
-pub(super) const LEAST_TURN_COSINE: f64 = std::f64::consts::FRAC_1_SQRT_2;
+pub(in crate::technique) const LEAST_TURN_COSINE: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
 /// A face below this stretch has no normal that other faces should be held against.
-pub(super) const HAS_NORMAL: f64 = 0.05;
+pub(in crate::technique) const HAS_NORMAL: f64 = 0.05;
 
 /// Stretch is computed here with other roundings than when a result is recounted.
 const ROUNDING: f64 = 1.0 + 1e-12;

@@ -133,11 +133,6 @@ impl<'a> Ground<'a> {
         self.sheets.len()
     }
 
-    /// The faces of a region.
-    pub fn region_faces(&self, region: u32) -> &[FaceId] {
-        &self.sheets[region as usize].faces
-    }
-
     /// The point of a region nearest to `p`.
     pub fn project(&self, region: u32, p: DVec3) -> Foot {
         let sheet = &self.sheets[region as usize];

@@ -16,14 +16,9 @@ use crate::mesh::halfedge::{HalfedgeMesh, edge_of};
 use crate::mesh::{EdgeMark, FaceId, Freedom, LockRules, MarkCause, Rim, Surface, VertexId, edge_key, resolve_freedom};
 use crate::technique::collapse::limits::least_stretch;
 use crate::technique::collapse::priority::Tally;
+use crate::technique::collapse::star::{HAS_NORMAL, LEAST_TURN_COSINE};
 use crate::technique::collapse::{Editor, Keeper};
 use crate::technique::quadric::Quadric;
-
-/// A face below this stretch has no normal that other faces should be held against.
-const HAS_NORMAL: f64 = 0.05;
-
-/// Faces may turn by at most 45 degrees in one edit.
-const LEAST_TURN_COSINE: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
 /// No edit leaves a face worse than this, even in between.
 const DEGENERATE: f64 = 1e-4;

@@ -15,8 +15,8 @@ use super::{Gain, relax};
 use crate::mesh::geometry::{angle, area_vector, stretch};
 use crate::mesh::halfedge::{HalfedgeMesh, edge_of};
 use crate::mesh::{EdgeId, FaceId, Freedom, VertexId};
+use crate::metric::shape::best_stretch_with_angle;
 use crate::technique::collapse::priority::Tally;
-use crate::technique::collapse::session::best_stretch_at;
 use crate::technique::collapse::{CollapseRules, Editor};
 use crate::watch::{Cancelled, Watch};
 
@@ -135,7 +135,7 @@ pub(super) fn reachable(mesh: &HalfedgeMesh, f: FaceId, threshold: f64) -> f64 {
         if is_curve[at] && is_curve[before] {
             let opening = angle(corners[next] - corners[at], corners[before] - corners[at]);
             if opening < SHARP {
-                target = target.min(NEAR_BEST * best_stretch_at(opening));
+                target = target.min(NEAR_BEST * best_stretch_with_angle(opening));
             }
         }
     }
