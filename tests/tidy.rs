@@ -15,7 +15,7 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("step", &["mesh", "metric"]),
     ("steps", &["mesh", "metric", "technique", "step"]),
     ("plan", &["recipe", "step", "mesh", "metric"]),
-    ("store", &["step", "mesh"]),
+    ("store", &["step", "mesh", "metric"]),
     ("schema", &["step", "metric"]),
     ("run", &["plan", "store", "step", "metric", "format", "mesh"]),
     ("report", &["run", "step", "metric", "mesh", "technique"]),
