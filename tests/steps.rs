@@ -25,6 +25,7 @@ mod steps {
     mod improve_quality;
     mod measure;
     mod partition;
+    mod promises;
     mod q_morph;
     mod q_morph_shapes;
     mod read;
