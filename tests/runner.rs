@@ -177,8 +177,7 @@ impl Bench {
     }
 
     fn options(&self, out: &str) -> RunOptions {
-        let (name, out) = ("toy".to_owned(), self.path(out));
-        RunOptions { name, out, jobs: self.jobs, only: Vec::new(), force: Vec::new(), cancelled: Arc::default() }
+        RunOptions::new("toy", self.path(out), self.jobs)
     }
 
     fn store(&self) -> Store {
@@ -438,8 +437,7 @@ fn child() {
     let text = CHAIN.replace("use = \"round\"", SLOW_CHAIN);
     let plan = plan_of(Path::new(folder), &text, &[]);
     let store = Store::open(&Path::new(folder).join("cache")).unwrap();
-    let (name, out) = ("toy".to_owned(), Path::new(folder).join(out));
-    let options = RunOptions { name, out, jobs: 2, only: Vec::new(), force: Vec::new(), cancelled: Arc::default() };
+    let options = RunOptions::new("toy", Path::new(folder).join(out), 2);
     let observer: Arc<dyn Observer> = Arc::new(Silent);
     run::run(&plan, &store, &options, &observer).unwrap();
 }

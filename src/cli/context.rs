@@ -11,8 +11,10 @@ use super::exit::{Exit, Fault};
 use crate::format::Format;
 use crate::plan::{self, CaseSpec, ColumnRequest, Context, Plan};
 use crate::recipe::{Overrides, Recipe, suggest};
+use crate::run::{self, RunError};
 use crate::steps::CATALOG;
 use crate::store::Store;
+use crate::store::stamp::Seen;
 
 /// Which recipe, with which values.
 #[derive(Clone, Debug, Args)]
@@ -96,6 +98,28 @@ impl Planned {
         texts.chain(read).collect()
     }
 
+    /// All of them as they are now, before the run reads them. A recipe counts only while its file holds the text that was planned.
+    pub(super) fn seen(&self) -> Vec<Seen> {
+        let texts = texts(&self.recipe);
+        let see = |file: PathBuf| {
+            let text = texts.iter().find(|(name, _)| Path::new(name) == file);
+            Seen::of(&file, text.map(|(_, text)| text.as_bytes()))
+        };
+        self.files().into_iter().map(see).collect()
+    }
+
+    /// Fails where a file that is to be written is one of those that are read, by whatever name.
+    pub(super) fn check_replaces(&self, file: &Path) -> Result<(), Fault> {
+        let read = self.files();
+        let read: Vec<&Path> = read.iter().map(PathBuf::as_path).collect();
+        match run::replaced(file, &read) {
+            Some(input) => {
+                Err(RunError::WouldReplace { output: file.to_path_buf(), input: input.to_path_buf() }.into())
+            }
+            None => Ok(()),
+        }
+    }
+
     /// Fails when a name that was given to `option` is no step of the recipe.
     pub(super) fn check_steps(&self, option: &str, names: &[String]) -> Result<(), Fault> {
         for name in names {
@@ -107,6 +131,18 @@ impl Planned {
         }
         Ok(())
     }
+}
+
+/// Where the lock of a recipe is, unless another place is named.
+pub(super) fn lock_file(recipe: &Recipe) -> PathBuf {
+    recipe.path.with_file_name(format!("{}.lock.ron", recipe.name))
+}
+
+/// Files that no output may replace, besides those that the plan reads: the recipe, its bases and its lock file.
+pub(super) fn protected(recipe: &Recipe) -> Vec<PathBuf> {
+    let mut files: Vec<PathBuf> = texts(recipe).into_iter().map(|(name, _)| PathBuf::from(name)).collect();
+    files.push(lock_file(recipe));
+    files
 }
 
 /// The texts that a recipe was read from, with the names of their files.

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use super::exit::{Exit, Fault, say};
 use crate::format::{self, Format, ReadCounts, WriteOptions};
 use crate::mesh::{Soup, Support};
-use crate::run::{VERSION, write_file};
+use crate::run::{VERSION, write_named};
 use crate::watch::Watch;
 
 /// Convert a mesh; the formats are told by the file endings.
@@ -36,7 +36,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Fault> {
         let help = error.remedy.clone();
         Fault::new(Exit::Step, format!("cannot write {}: {error}", arguments.to.display())).help_opt(help)
     })?;
-    write_file(&arguments.to, &bytes)?;
+    write_named(&arguments.to, &bytes)?;
     say(&format!("{}: {} vertices, {} faces", arguments.to.display(), soup.points.len(), soup.faces.len()));
     for what in left_out(counts) {
         say(&format!("  left out on reading: {what}"));

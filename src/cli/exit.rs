@@ -120,6 +120,14 @@ impl From<RunError> for Fault {
             RunError::Output { .. } => {
                 Self::new(Exit::Store, error.to_string()).help("check the folder and its free space, or use --out DIR")
             }
+            RunError::WouldReplace { .. } => Self::usage(error.to_string())
+                .help("name another folder with --out, or another output in the recipe; nothing was written"),
+            RunError::Link(_) => {
+                Self::usage(error.to_string()).help("remove the link, or name the folder itself with --out")
+            }
+            RunError::Claimed(_) => {
+                Self::new(Exit::Store, error.to_string()).help("wait until it has ended, or use --out DIR")
+            }
             RunError::Threads(..) => Self::new(Exit::Fault, error.to_string()).help("use fewer with --jobs N"),
         }
     }

@@ -10,7 +10,7 @@ use super::signals::Interrupt;
 use crate::mesh::Soup;
 use crate::metric::{Measurement, Value, measure};
 use crate::report::measure::number_text;
-use crate::run::{Silent, write_file};
+use crate::run::{Silent, write_named};
 use crate::watch::Watch;
 
 /// Measure a mesh and write a commented recipe with sensible sizes for it. Asks nothing.
@@ -52,7 +52,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Fault> {
         return Err(Fault::usage(message).help("the recipe would find no surface in it"));
     }
     let text = recipe((&name, &out.display().to_string()), &input, &soup, &look);
-    write_file(&out, text.as_bytes())?;
+    write_named(&out, text.as_bytes())?;
     say(&format!("{}: written; `meshmill run {}` makes the mesh", out.display(), out.display()));
     Ok(Exit::Done)
 }

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use clap::ValueEnum;
 
 use super::Global;
-use super::context::{Planned, RecipeArguments, open_store};
+use super::context::{Planned, RecipeArguments, lock_file, open_store};
 use super::exit::{Exit, Fault, say};
 use super::picture::Pictures;
 use super::run::{execute, options, tell};
@@ -55,6 +55,9 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Fault>
     let store = open_store(global)?;
     let interrupt = Interrupt::listen();
     let options = options(&planned, arguments.out.as_deref(), arguments.jobs, &interrupt)?;
+    let file = arguments.to.clone().unwrap_or_else(|| lock_file(&planned.recipe));
+    planned.check_replaces(&file)?;
+    let _claim = run::claim(&options.out)?;
     let before = ingredients(&planned.recipe.name, &planned.plan, &run::records(&planned.plan, &store, &options));
     let (report, cancelled) = execute(&planned, &store, &options, global, (None, Pictures::default()))?;
     if report.status != Status::Done {
@@ -70,16 +73,11 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Fault>
     let tolerance = if class == Class::Tolerance { arguments.tolerance } else { 0.0 };
     let lock = Lock { class, tolerance, ..before.with_results(&report, &options.out) };
     let text = lock.to_ron().map_err(|error| Fault::new(Exit::Fault, format!("cannot write the lock: {error}")))?;
-    let file = arguments.to.clone().unwrap_or_else(|| lock_file(&planned));
-    run::write_file(&file, text.as_bytes())?;
+    run::write_named(&file, text.as_bytes())?;
     if !global.quiet {
         say(&format!("{}: locked {} tasks and {} files", file.display(), lock.tasks.len(), lock.files.len()));
     }
     Ok(Exit::Done)
-}
-
-fn lock_file(planned: &Planned) -> PathBuf {
-    planned.recipe.path.with_file_name(format!("{}.lock.ron", planned.recipe.name))
 }
 
 /// A lock that a run is held against.
@@ -92,7 +90,7 @@ pub(super) struct Held {
 impl Held {
     /// Reads the lock, the usual one where `file` is empty, and fails when the run would not be of what was locked.
     pub(super) fn new(file: &Path, planned: &Planned, store: &Store, options: &RunOptions) -> Result<Self, Fault> {
-        let file = if file.as_os_str().is_empty() { lock_file(planned) } else { file.to_path_buf() };
+        let file = if file.as_os_str().is_empty() { lock_file(&planned.recipe) } else { file.to_path_buf() };
         let text = fs::read_to_string(&file).map_err(|error| {
             Fault::usage(format!("cannot read the lock {}: {error}", file.display())).help("`meshmill lock` writes one")
         })?;

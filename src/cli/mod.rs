@@ -102,6 +102,7 @@ pub fn main() -> ExitCode {
     };
     start_log(&arguments.global);
     quiet_panics();
+    signals::outlive_file_limits();
     let global = &arguments.global;
     let result = std::panic::catch_unwind(|| match &arguments.command {
         Command::Run(command) => run::run(command, global),

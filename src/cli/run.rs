@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::Global;
-use super::context::{Planned, RecipeArguments, open_store};
+use super::context::{Planned, RecipeArguments, open_store, protected};
 use super::exit::{Exit, Fault, data, say, say_failure};
 use super::lock::Held;
 use super::picture::{self, Pictures};
@@ -71,8 +71,13 @@ pub(super) fn once(arguments: &Arguments, global: &Global, interrupt: &Interrupt
     planned.check_steps("--force", &arguments.force)?;
     let store = open_store(global)?;
     let mut options = options(&planned, arguments.out.as_deref(), arguments.jobs, interrupt)?;
+    if let Some(file) = &arguments.trace {
+        planned.check_replaces(file)?;
+    }
+    let _claim = run::claim(&options.out)?;
     options.only.clone_from(&arguments.only);
     options.force.clone_from(&arguments.force);
+    let seen = if unchanged.is_some() { planned.seen() } else { Vec::new() };
     let held = arguments.locked.as_ref().map(|file| Held::new(Path::new(file), &planned, &store, &options));
     let held = held.transpose()?;
     let extras = (arguments.trace.as_deref(), arguments.pictures);
@@ -89,10 +94,8 @@ pub(super) fn once(arguments: &Arguments, global: &Global, interrupt: &Interrupt
     }
     if let (Some(unchanged), Status::Done) = (unchanged, report.status) {
         let out = if global.quiet { String::new() } else { table::report(&report.unchanged()) };
-        let mut files = planned.files();
-        files.extend(report.written());
         let said = Said { out, err: Vec::new(), exit: 0 };
-        unchanged.remember(&store, files, said, &report, &options.out)?;
+        unchanged.remember(&store, (seen, report.written().collect()), said, &report, &options.out)?;
     }
     Ok(report.status.into())
 }
@@ -121,7 +124,7 @@ pub(super) fn execute(
     if !outcome.cancelled {
         // Only then: reading the last record of ten thousand steps takes longer than all the rest.
         if report.status != Status::Done && options.only.is_empty() {
-            remove_stale(&report, &options.out);
+            remove_stale(&report, &options.out, &planned.files());
         }
         picture::write(&planned.plan, &outcome, store, pictures)?;
         write_record(&report, &options.out)?;
@@ -130,13 +133,17 @@ pub(super) fn execute(
 }
 
 /// Removes what the last run of this folder wrote and this one did not, with its picture, so that nobody takes it for a
-/// result of this one. What somebody has changed since is left, and what cannot be removed too.
-fn remove_stale(report: &Report, out: &Path) {
+/// result of this one. What somebody has changed since is left, and what this run read, and what cannot be removed.
+fn remove_stale(report: &Report, out: &Path, read: &[PathBuf]) {
     let Ok(text) = fs::read_to_string(out.join("run.ron")) else { return };
     let Ok(last) = record::from_ron(&text) else { return };
     let there: BTreeSet<PathBuf> = report.written().collect();
+    let read: Vec<&Path> = read.iter().map(PathBuf::as_path).collect();
     for file in last.cases.iter().flat_map(|case| &case.files) {
         let path = Path::new(&file.path);
+        if !path.starts_with(out) || run::replaced(path, &read).is_some() {
+            continue;
+        }
         let Some(content) = file.content.as_ref().filter(|_| !there.contains(path)) else { continue };
         if fs::read(path).is_ok_and(|bytes| blake3::hash(&bytes).to_hex().as_str() == content) {
             let _ = fs::remove_file(path);
@@ -173,7 +180,8 @@ pub(super) fn options(
     let jobs = jobs_of(jobs)?;
     let out = folder(out.map_or_else(|| Path::new("out").join(&name), Path::to_path_buf))?;
     let cancelled = Arc::clone(&interrupt.cancelled);
-    Ok(RunOptions { name, out, jobs, only: Vec::new(), force: Vec::new(), cancelled })
+    let protected = protected(&planned.recipe);
+    Ok(RunOptions { protected, cancelled, ..RunOptions::new(&name, out, jobs) })
 }
 
 /// The folder of the outputs; nothing may be there, or a folder.

@@ -24,6 +24,13 @@ pub(super) struct Interrupt {
     signal: Arc<AtomicU8>,
 }
 
+/// Lets a file that grows past the limit of its user (`ulimit -f`) be an error of writing, as a full disk is, and not
+/// the end of the process, which would leave its temporary file behind.
+pub(super) fn outlive_file_limits() {
+    #[cfg(unix)]
+    let _ = signal_hook::flag::register(signal_hook::consts::SIGXFSZ, Arc::new(AtomicBool::new(false)));
+}
+
 impl Interrupt {
     /// Listens from now on. Where the system refuses, signals end the process as they always did.
     pub(super) fn listen() -> Self {

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::Global;
-use super::context::{Planned, RecipeArguments, list_files, open_store, pair, plan_cases};
+use super::context::{Planned, RecipeArguments, list_files, open_store, pair, plan_cases, protected};
 use super::exit::{Exit, Fault, data, say};
 use super::picture::{self, Pictures};
 use super::run::{folder, jobs_of, traced, write_record};
@@ -76,6 +76,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Fault>
     let interrupt = Interrupt::listen();
     if arguments.goal.is_some() {
         let (store, options) = (open_store(global)?, options(arguments, &recipe, &interrupt, "goal")?);
+        let _claim = run::claim(&options.out)?;
         let observer = progress::observer(global.quiet, global.verbose > 0);
         return goal::run(arguments, global, recipe, (&store, &options, observer), &interrupt);
     }
@@ -88,7 +89,11 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Fault>
         return Ok(Exit::Done);
     }
     let (store, options) = (open_store(global)?, options(arguments, &recipe, &interrupt, "sweep")?);
+    let _claim = run::claim(&options.out)?;
     let trace = arguments.trace.as_deref();
+    let planned = Planned { recipe, plan };
+    let seen = if unchanged.is_some() { planned.seen() } else { Vec::new() };
+    let Planned { recipe, plan } = planned;
     let outcome = traced(trace, global, &|observer| run::run(&plan, &store, &options, observer))?;
     let table = SweepTable::new(&recipe.name, &found.varied, &plan, &outcome);
     if outcome.cancelled {
@@ -107,10 +112,9 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Fault>
     let said = tell(&table, arguments, global.quiet)?;
     // Which files a pattern finds is not known from files.
     if let Some(unchanged) = unchanged.filter(|_| !found.lists_files && table.count(RowState::Failed) == 0) {
-        let mut files = Planned { recipe, plan }.files();
-        files.extend(report.written());
-        files.extend(["sweep.csv", "sweep.ron"].map(|name| options.out.join(name)));
-        unchanged.remember(&store, files, said, &report, &options.out)?;
+        let mut written: Vec<PathBuf> = report.written().collect();
+        written.extend(["sweep.csv", "sweep.ron"].map(|name| options.out.join(name)));
+        unchanged.remember(&store, (seen, written), said, &report, &options.out)?;
     }
     Ok(exit(&table))
 }
@@ -126,13 +130,11 @@ impl Arguments {
 
 fn options(arguments: &Arguments, recipe: &Recipe, interrupt: &Interrupt, what: &str) -> Result<RunOptions, Fault> {
     let usual = || Path::new("out").join(format!("{}-{what}", recipe.name));
+    let out = folder(arguments.out.clone().unwrap_or_else(usual))?;
     Ok(RunOptions {
-        name: recipe.name.clone(),
-        out: folder(arguments.out.clone().unwrap_or_else(usual))?,
-        jobs: jobs_of(arguments.jobs)?,
-        only: Vec::new(),
-        force: Vec::new(),
+        protected: protected(recipe),
         cancelled: Arc::clone(&interrupt.cancelled),
+        ..RunOptions::new(&recipe.name, out, jobs_of(arguments.jobs)?)
     })
 }
 

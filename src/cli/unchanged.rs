@@ -8,7 +8,7 @@ use super::exit::{Fault, data, say};
 use super::run::record_text;
 use crate::report::Report;
 use crate::store::Store;
-use crate::store::stamp::{Said, identity, program};
+use crate::store::stamp::{Said, Seen, identity, program};
 
 /// Which run is meant: the program, the place, and the arguments that decide what it does and says.
 pub(super) struct Unchanged {
@@ -35,19 +35,19 @@ impl Unchanged {
         Some(said.exit)
     }
 
-    /// Remembers a run by the files that it read and wrote, besides its record, which the next run replaces by that of
-    /// a run in which everything was there.
+    /// Remembers a run by the files that it read, as they were before it, and those that it wrote, besides its record,
+    /// which the next run replaces by that of a run in which everything was there.
     pub(super) fn remember(
         &self,
         store: &Store,
-        files: Vec<PathBuf>,
+        (read, written): (Vec<Seen>, Vec<PathBuf>),
         said: Said,
         report: &Report,
         out: &Path,
     ) -> Result<(), Fault> {
         let record = out.join("run.ron");
         let text = record_text(&report.unchanged())?;
-        store.stamp(&self.identity, files, said, Some((record, text)));
+        store.stamp(&self.identity, (read, written), said, Some((record, text)));
         Ok(())
     }
 }

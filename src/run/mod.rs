@@ -18,8 +18,10 @@
 //! sweep finish one after the other and few artifacts are alive.
 
 pub mod board;
+mod claim;
 mod figures;
 mod gate;
+mod guard;
 mod job;
 pub mod observe;
 pub mod outcome;
@@ -36,6 +38,8 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 pub use board::TaskState;
+pub use claim::{Claim, claim};
+pub use guard::replaced;
 pub use observe::{Event, Observer, Silent};
 pub use outcome::{FileOutcome, FileState, RunOutcome, TaskOutcome};
 pub use preview::{Explained, Forecast, explain, preview, records};
@@ -59,8 +63,18 @@ pub struct RunOptions {
     pub only: Vec<String>,
     /// Steps that run again although they are cached.
     pub force: Vec<String>,
+    /// Files besides the plan's that no output may replace: the recipe, its bases, a lock file.
+    pub protected: Vec<PathBuf>,
     /// Becomes true when the run should stop.
     pub cancelled: Arc<AtomicBool>,
+}
+
+impl RunOptions {
+    /// A run of all steps, nothing forced, that nobody interrupts.
+    pub fn new(name: &str, out: PathBuf, jobs: usize) -> Self {
+        let (only, force, protected) = (Vec::new(), Vec::new(), Vec::new());
+        Self { name: name.to_owned(), out, jobs, only, force, protected, cancelled: Arc::default() }
+    }
 }
 
 /// Why a run ended early. Failures of steps and gates are part of the outcome instead.
@@ -79,6 +93,20 @@ pub enum RunError {
         /// What the system said.
         source: std::io::Error,
     },
+    /// An output is one of the files that the run reads, perhaps by another name.
+    #[error("the output {} is the file {}, which the run reads", output.display(), input.display())]
+    WouldReplace {
+        /// The file to be written.
+        output: PathBuf,
+        /// The file that is read.
+        input: PathBuf,
+    },
+    /// A folder below that of the outputs is a link.
+    #[error("{} is a link, and outputs below it would lie elsewhere", .0.display())]
+    Link(PathBuf),
+    /// Another run writes into the folder of the outputs.
+    #[error("another run writes into {}", .0.display())]
+    Claimed(PathBuf),
     /// The threads that were asked for could not be started.
     #[error("cannot start {0} threads: {1}")]
     Threads(usize, String),
@@ -98,7 +126,13 @@ pub(crate) fn tasks_of(plan: &Plan, steps: &[String]) -> BTreeSet<crate::plan::T
     tasks
 }
 
-/// Writes a file that appears whole or not at all, and makes its folder.
+/// Writes a file below the folder of the outputs: it appears whole or not at all, and a link in its place is replaced.
 pub fn write_file(path: &std::path::Path, bytes: &[u8]) -> Result<(), RunError> {
     whole::write(path, bytes).map_err(|source| RunError::Output { action: "write", path: path.to_path_buf(), source })
+}
+
+/// The same for a file that the user named: where that is a link, what it leads to is written.
+pub fn write_named(path: &std::path::Path, bytes: &[u8]) -> Result<(), RunError> {
+    let real = std::fs::canonicalize(path);
+    write_file(real.as_deref().unwrap_or(path), bytes)
 }

@@ -11,9 +11,10 @@ use super::job::{self, Finished, Node};
 use super::observe::Observer;
 use super::outcome::{FileOutcome, FileState, RunOutcome, TaskOutcome};
 use super::shared::{Shared, unreadable};
-use super::{RunError, RunOptions, output, tasks_of, whole};
+use super::{RunError, RunOptions, guard, output, tasks_of};
 use crate::plan::{Plan, SourceTask, Task, TaskId, in_case};
 use crate::step::{FailureKind, StepFailure};
+use crate::store::leftover::remove_leftovers;
 use crate::store::{Entry, Outcome, Store};
 
 /// Runs a plan. Failures of steps and gates are in the outcome; the rest of the graph goes on without them.
@@ -24,10 +25,11 @@ pub fn run(
     observer: &Arc<dyn Observer>,
 ) -> Result<RunOutcome, RunError> {
     let start = Instant::now();
+    guard::check(plan, options)?;
     let shared = Shared::new(plan, store, options);
     for case in 0..plan.cases().len() {
-        whole::remove_leftovers(&shared.folder(case));
-        whole::remove_leftovers(&shared.folder(case).join("failed"));
+        remove_leftovers(&shared.folder(case));
+        remove_leftovers(&shared.folder(case).join("failed"));
     }
     let mut schedule = Schedule::new(&shared, Arc::clone(observer));
     let (sender, receiver) = mpsc::channel();

@@ -12,7 +12,7 @@ use std::time::{Duration, SystemTime};
 use blake3::Hash;
 use serde::Serialize;
 
-use super::{Entry, Store, StoreError, TAG_FILE, verified};
+use super::{Entry, Store, StoreError, TAG_FILE, seal, verified};
 
 /// Files that somebody may be about to name are left alone for this long.
 const GRACE: Duration = Duration::from_hours(1);
@@ -80,7 +80,7 @@ impl Store {
         entries.sort_by(|a, b| (a.modified, a.hash.as_bytes()).cmp(&(b.modified, b.hash.as_bytes())));
         let blobs: BTreeMap<[u8; 32], Item> =
             self.items("cas")?.into_iter().map(|blob| (*blob.hash.as_bytes(), blob)).collect();
-        let contents: Vec<Option<[u8; 32]>> = entries.iter().map(|entry| content_of(&entry.path)).collect();
+        let contents: Vec<Option<[u8; 32]>> = entries.iter().map(content_of).collect();
         let mut users: BTreeMap<[u8; 32], u64> = BTreeMap::new();
         for content in contents.iter().flatten() {
             *users.entry(*content).or_default() += 1;
@@ -117,7 +117,7 @@ impl Store {
     pub fn verify(&self) -> Result<CleanReport, StoreError> {
         let mut report = CleanReport::default();
         for entry in self.items("ac")? {
-            if fs::read(&entry.path).is_ok_and(|bytes| Entry::decode(&bytes).is_err()) {
+            if fs::read(&entry.path).is_ok_and(|bytes| Entry::decode(&entry.hash, &bytes).is_err()) {
                 report.remove(&entry, false, Removed::Entry);
                 report.damaged.push(entry.path);
             }
@@ -133,7 +133,7 @@ impl Store {
 
     /// Removes everything. Refuses a folder that does not say that it is a cache.
     pub fn clear(&self) -> Result<CleanReport, StoreError> {
-        if !self.root.join(TAG_FILE).exists() {
+        if !seal::is_plain(&self.root.join(TAG_FILE)) {
             return Err(StoreError::NotACache(self.root.clone()));
         }
         let stat = self.stat()?;
@@ -194,8 +194,8 @@ impl CleanReport {
     }
 }
 
-fn content_of(entry: &Path) -> Option<[u8; 32]> {
-    let entry = Entry::decode(&fs::read(entry).ok()?).ok()?;
+fn content_of(item: &Item) -> Option<[u8; 32]> {
+    let entry = Entry::decode(&item.hash, &fs::read(&item.path).ok()?).ok()?;
     Some(*entry.content()?.as_bytes())
 }
 

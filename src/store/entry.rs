@@ -1,18 +1,14 @@
 //! What the store knows of a finished task without loading its artifact.
 //!
-//! An entry is one line with a checksum and a JSON document; one small read serves a cache hit, the report and the
-//! explanation why a later run misses.
+//! An entry is a JSON document sealed with its key, so that it serves no other; one small read serves a cache hit, the
+//! report and the explanation why a later run misses.
 
 use blake3::Hash;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::Value;
 
+use super::seal::{self, SealError};
 use crate::metric::Measurement;
-
-/// First word of an entry file.
-const MAGIC: &str = "meshmill-entry-1 ";
-/// Length of the checksum: BLAKE3 in hexadecimal.
-const CHECKSUM: usize = 64;
 
 /// Numbers of an artifact for progress, tables and run records.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -77,39 +73,24 @@ pub struct Entry {
 /// Why bytes are not an entry.
 #[derive(Debug, thiserror::Error)]
 pub enum EntryError {
-    /// Not an entry, or cut short.
-    #[error("not an entry of this version")]
-    NotAnEntry,
-    /// The bytes are not those that were written.
-    #[error("the checksum differs")]
-    Checksum,
+    /// Damaged, of another version, or the entry of another key.
+    #[error(transparent)]
+    Seal(#[from] SealError),
     /// The document does not fit.
     #[error("{0}")]
     Json(#[from] serde_json::Error),
 }
 
 impl Entry {
-    /// The bytes of an entry file.
-    pub fn encode(&self) -> Vec<u8> {
+    /// The bytes of the entry file of this key.
+    pub fn encode(&self, key: &Hash) -> Vec<u8> {
         // A map with string keys and finite or absent numbers cannot fail to serialise.
-        let body = serde_json::to_vec(self).unwrap_or_default();
-        let mut bytes = Vec::with_capacity(body.len() + MAGIC.len() + CHECKSUM + 1);
-        bytes.extend_from_slice(MAGIC.as_bytes());
-        bytes.extend_from_slice(blake3::hash(&body).to_hex().as_bytes());
-        bytes.push(b'\n');
-        bytes.extend_from_slice(&body);
-        bytes
+        seal::seal(key.as_bytes(), &serde_json::to_vec(self).unwrap_or_default())
     }
 
-    /// The entry in these bytes.
-    pub fn decode(bytes: &[u8]) -> Result<Self, EntryError> {
-        let rest = bytes.strip_prefix(MAGIC.as_bytes()).ok_or(EntryError::NotAnEntry)?;
-        let (checksum, rest) = rest.split_at_checked(CHECKSUM).ok_or(EntryError::NotAnEntry)?;
-        let body = rest.strip_prefix(b"\n").ok_or(EntryError::NotAnEntry)?;
-        if blake3::hash(body).to_hex().as_bytes() != checksum {
-            return Err(EntryError::Checksum);
-        }
-        Ok(serde_json::from_slice(body)?)
+    /// The entry of this key in these bytes.
+    pub fn decode(key: &Hash, bytes: &[u8]) -> Result<Self, EntryError> {
+        Ok(serde_json::from_slice(seal::open(key.as_bytes(), bytes)?)?)
     }
 
     /// The content hash of what came out, where it is an artifact.

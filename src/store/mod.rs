@@ -12,9 +12,10 @@
 //!
 //! # Invariants
 //! - A file appears under its final name only whole: it is written in `tmp`, on the same file system, and renamed.
-//! - There is no lock. Whoever dies at any moment leaves at most a file in `tmp`, which `gc` removes.
+//! - There is no lock. Whoever dies at any moment leaves at most a file in `tmp`, which the next one removes.
 //! - An entry is published after its blob. A missing or damaged blob or entry is a miss, never a wrong result:
-//!   entries carry a checksum, blobs are hashed when they are loaded.
+//!   entries, names and indices are sealed with the name they have, blobs are hashed when they are loaded.
+//! - Only plain files count. A link, folder or pipe in a file's place is a miss and is replaced, never followed.
 //! - Two writers of one key write the same content, because steps are pure; the last rename wins and nothing changes.
 //!
 //! Nothing is flushed to the disk by `fsync`: after a power cut a file may be empty or cut short, which the checks
@@ -24,12 +25,14 @@ pub mod clean;
 pub mod codec;
 mod columns;
 pub mod entry;
+pub mod leftover;
 mod pack;
+mod seal;
 pub mod stamp;
 pub mod stat_index;
 
 use std::fs;
-use std::io::{self, Write};
+use std::io;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 
@@ -39,6 +42,7 @@ use tracing::warn;
 pub use clean::{CleanReport, GcLimits, StoreStat};
 pub use codec::{CODEC_VERSION, CodecError};
 pub use entry::{Entry, Figures, Outcome};
+pub use seal::SealError;
 pub use stat_index::StatIndex;
 
 use crate::step::Artifact;
@@ -103,9 +107,10 @@ impl Store {
                 fs::create_dir_all(&path).map_err(StoreError::io("create the cache folder", &path))?;
             }
         }
+        leftover::remove_leftovers(&store.folder("tmp"));
         let tag = root.join(TAG_FILE);
-        if !tag.exists() {
-            fs::write(&tag, TAG_TEXT).map_err(StoreError::io("write", &tag))?;
+        if fs::symlink_metadata(&tag).is_err() {
+            store.write_whole(&tag, TAG_TEXT.as_bytes())?;
         }
         Ok(store)
     }
@@ -132,7 +137,7 @@ impl Store {
     /// What the task of this key gave, where that is known. A damaged entry is a miss, and said so.
     pub fn entry(&self, key: &Hash) -> Option<Entry> {
         let path = self.place("ac", key);
-        let bytes = match fs::read(&path) {
+        let bytes = match seal::read(&path) {
             Ok(bytes) => bytes,
             Err(error) => {
                 if error.kind() != io::ErrorKind::NotFound {
@@ -141,7 +146,7 @@ impl Store {
                 return None;
             }
         };
-        match Entry::decode(&bytes) {
+        match Entry::decode(key, &bytes) {
             Ok(entry) => {
                 refresh(&path);
                 Some(entry)
@@ -155,15 +160,17 @@ impl Store {
 
     /// Publishes what the task of this key gave. Save its artifact first.
     pub fn publish(&self, key: &Hash, entry: &Entry) -> Result<(), StoreError> {
-        self.write_whole(&self.place("ac", key), &entry.encode())?;
-        self.write_whole(&self.place("names", &name_hash(&entry.task)), key.to_hex().as_bytes())
+        self.write_whole(&self.place("ac", key), &entry.encode(key))?;
+        let name = name_hash(&entry.task);
+        self.write_whole(&self.place("names", &name), &seal::seal(name.as_bytes(), key.to_hex().as_bytes()))
     }
 
     /// The newest result of a task of this name, whatever its key.
     pub fn newest(&self, task: &str) -> Option<(Hash, Entry)> {
-        let text = fs::read_to_string(self.place("names", &name_hash(task))).ok()?;
-        let key = Hash::from_hex(text.trim()).ok()?;
-        Some((key, Entry::decode(&fs::read(self.place("ac", &key)).ok()?).ok()?))
+        let name = name_hash(task);
+        let bytes = seal::read(&self.place("names", &name)).ok()?;
+        let key = Hash::from_hex(seal::open(name.as_bytes(), &bytes).ok()?).ok()?;
+        Some((key, Entry::decode(&key, &seal::read(&self.place("ac", &key)).ok()?).ok()?))
     }
 
     /// Saves an artifact under its content hash. Content that is there already is not written again.
@@ -171,7 +178,7 @@ impl Store {
         let canonical = codec::encode(artifact);
         let content = codec::content_hash(&canonical);
         let path = self.place("cas", &content);
-        if path.exists() {
+        if seal::is_plain(&path) {
             refresh(&path);
         } else {
             self.write_whole(&path, &pack::pack(&canonical)?)?;
@@ -182,7 +189,7 @@ impl Store {
     /// The artifact of this content. A missing or damaged blob is a miss; a damaged one is said so and removed.
     pub fn load(&self, content: &Hash) -> Option<Artifact> {
         let path = self.place("cas", content);
-        let bytes = match fs::read(&path) {
+        let bytes = match seal::read(&path) {
             Ok(bytes) => bytes,
             Err(error) => {
                 warn!(path = %path.display(), %error, "a cached artifact cannot be read; it is computed again");
@@ -206,19 +213,26 @@ impl Store {
         }
     }
 
-    /// Writes `bytes` aside and renames them to `path`.
+    /// Writes `bytes` aside and renames them to `path`: a link or pipe there is replaced, never written through, and a
+    /// folder is moved aside.
     fn write_whole(&self, path: &Path, bytes: &[u8]) -> Result<(), StoreError> {
         let tmp = self.folder("tmp");
         let write = || -> io::Result<()> {
-            let mut file = shared_with_group(tempfile::Builder::new().prefix("w")).tempfile_in(&tmp)?;
-            file.write_all(bytes)?;
             if let Some(parent) = path.parent() {
                 fs::create_dir_all(parent)?;
             }
-            file.persist(path).map_err(|error| error.error)?;
-            Ok(())
+            if fs::symlink_metadata(path).is_ok_and(|meta| meta.is_dir()) {
+                self.move_aside(path)?;
+            }
+            leftover::write_by_rename(&tmp, path, bytes)
         };
         write().map_err(StoreError::io("write", path))
+    }
+
+    /// Moves a folder that is in a file's place out of the way; `gc` removes it.
+    fn move_aside(&self, path: &Path) -> io::Result<()> {
+        let aside = tempfile::Builder::new().prefix("folder").tempdir_in(self.folder("tmp"))?.keep();
+        fs::rename(path, aside.join("was"))
     }
 }
 
@@ -245,13 +259,6 @@ fn refresh(path: &Path) {
     {
         let _ = file.set_modified(now);
     }
-}
-
-/// Temporary files are private to their owner as a rule; here the umask decides, so that a lab can share the folder.
-fn shared_with_group<'a, 'b>(builder: &'a mut tempfile::Builder<'b, 'b>) -> &'a mut tempfile::Builder<'b, 'b> {
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    builder
 }
 
 #[cfg(test)]

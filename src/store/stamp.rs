@@ -4,9 +4,16 @@
 //! tasks that is up to date costs one small file and a stat a file. A stamp is a short cut and never a source: whatever
 //! is not exactly as it was is looked at task by task.
 //!
+//! What a run reads is seen before it is read ([`Seen`]), and is in the stamp only where it is still the same at the end:
+//! a file that was replaced while the run went on belongs to no stamp, and the next run looks at it.
+//!
 //! As in the index of file hashes, a file that was modified just before its stat was taken is not trusted, since it may
 //! have changed again within the resolution of its clock: twenty milliseconds where times have fractions of a second,
 //! two seconds where they have none.
+//!
+//! What cannot be seen: a change that leaves size, times of modification and change, device and inode as they were. A
+//! file that is written through a memory map and not yet synchronised is such a one, and so is one on a network file
+//! system whose attributes are cached here; for these, `--force` a step, or touch the file.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -15,8 +22,8 @@ use std::time::{Duration, SystemTime};
 use blake3::Hash;
 use serde::{Deserialize, Serialize};
 
-use super::Store;
 use super::stat_index::{Stat, host, stat};
+use super::{Store, seal};
 
 /// A file modified so shortly before is waited for.
 const FINE: Duration = Duration::from_millis(20);
@@ -72,7 +79,8 @@ impl Store {
     /// What the run of this identity said, if all that it read and wrote is as it was. The first time it writes the
     /// record of a run that did nothing.
     pub fn unchanged(&self, identity: &Hash) -> Option<Said> {
-        let stamp: Stamp = serde_json::from_slice(&fs::read(self.stamp_file(identity)).ok()?).ok()?;
+        let bytes = seal::read(&self.stamp_file(identity)).ok()?;
+        let stamp: Stamp = serde_json::from_slice(seal::open(identity.as_bytes(), &bytes).ok()?).ok()?;
         let same = |(path, known): &(PathBuf, Stat)| fs::metadata(path).is_ok_and(|meta| stat(&meta) == *known);
         if !stamp.files.iter().all(same) {
             return None;
@@ -80,9 +88,15 @@ impl Store {
         stamp.record.is_none_or(|record| record.advance()).then_some(stamp.said)
     }
 
-    /// Remembers a run by its files, and its record with the text that the next run puts there. Does nothing where a file cannot be trusted; failing to write costs time later and
-    /// nothing else.
-    pub fn stamp(&self, identity: &Hash, files: Vec<PathBuf>, said: Said, record: Option<(PathBuf, String)>) {
+    /// Remembers a run by the files that it read and wrote, and its record with the text that the next run puts there.
+    /// Does nothing where a file cannot be trusted; failing to write costs time later and nothing else.
+    pub fn stamp(
+        &self,
+        identity: &Hash,
+        (read, written): (Vec<Seen>, Vec<PathBuf>),
+        said: Said,
+        record: Option<(PathBuf, String)>,
+    ) {
         let path = self.stamp_file(identity);
         let next = path.with_extension("ron");
         let record = record.map(|(place, text)| {
@@ -91,11 +105,15 @@ impl Store {
             let path = std::path::absolute(place).ok()?;
             Some(Record { now: known(&path)?, path, then: known(&next)?, next: next.clone() })
         });
-        let (Some(files), Some(record)) = (trusted(files), record.map_or(Some(None), |record| record.map(Some))) else {
+        let (Some(mut files), Some(record)) = (trusted(written), record.map_or(Some(None), |record| record.map(Some)))
+        else {
             return;
         };
+        let read: Option<Vec<_>> = read.into_iter().map(Seen::still).collect();
+        let Some(read) = read else { return };
+        files.extend(read);
         if let Ok(bytes) = serde_json::to_vec(&Stamp { files, said, record })
-            && let Err(error) = self.write_whole(&path, &bytes)
+            && let Err(error) = self.write_whole(&path, &seal::seal(identity.as_bytes(), &bytes))
         {
             tracing::warn!(%error, "the stamp of the run was not saved");
         }
@@ -122,6 +140,25 @@ impl Store {
 
 fn prefix() -> String {
     format!("{}-run-", host())
+}
+
+/// A file as it was before it was read.
+#[derive(Clone, Debug)]
+pub struct Seen(Option<(PathBuf, Stat)>);
+
+impl Seen {
+    /// Looks at a file that will be read after this. One that was modified just now is waited for, at most twenty
+    /// milliseconds, so that what is read later is what its stat says. Where `text` was read already, the file counts
+    /// only if it holds just that.
+    pub fn of(path: &Path, text: Option<&[u8]>) -> Self {
+        let seen = trusted(vec![path.to_path_buf()]).and_then(|mut files| files.pop());
+        Self(seen.filter(|(path, _)| text.is_none_or(|text| fs::read(path).is_ok_and(|bytes| bytes == text))))
+    }
+
+    /// The file with its stat, where it is still as it was seen.
+    fn still(self) -> Option<(PathBuf, Stat)> {
+        self.0.filter(|(path, known)| fs::metadata(path).is_ok_and(|meta| stat(&meta) == *known))
+    }
 }
 
 /// The files with their stats, when each is old enough; a little is waited for.
@@ -171,6 +208,41 @@ pub fn program() -> Vec<u8> {
 mod tests {
     use super::*;
 
+    fn seen(path: &Path) -> Vec<Seen> {
+        vec![Seen::of(path, None)]
+    }
+
+    #[test]
+    fn a_file_replaced_after_it_was_seen_is_in_no_stamp() {
+        let folder = tempfile::tempdir().unwrap();
+        let store = Store::open(&folder.path().join("cache")).unwrap();
+        let file = folder.path().join("part.stl");
+        fs::write(&file, "old").unwrap();
+        let before = seen(&file);
+        fs::write(&file, "new").unwrap();
+        let id = identity(&[b"run"]);
+        store.stamp(&id, (before, Vec::new()), Said::default(), None);
+        assert_eq!(store.unchanged(&id), None);
+        store.stamp(&id, (vec![Seen::of(&file, Some(b"old"))], Vec::new()), Said::default(), None);
+        assert_eq!(store.unchanged(&id), None, "a text that the file does not hold was trusted");
+        store.stamp(&id, (vec![Seen::of(&file, Some(b"new"))], Vec::new()), Said::default(), None);
+        assert_eq!(store.unchanged(&id), Some(Said::default()));
+    }
+
+    #[test]
+    fn what_is_seen_is_older_than_a_tick_of_its_clock() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("part.stl");
+        for text in ["one", "two", "six"] {
+            fs::write(&file, text).unwrap();
+            let Seen(known) = Seen::of(&file, None);
+            // Who writes after this, writes at another time.
+            if let Some((_, known)) = known {
+                assert!(known.age(SystemTime::now()) >= FINE || !known.has_fractions());
+            }
+        }
+    }
+
     #[test]
     fn a_stamp_holds_until_a_file_changes() {
         let folder = tempfile::tempdir().unwrap();
@@ -181,16 +253,16 @@ mod tests {
         let said = Said { out: "done".to_owned(), ..Said::default() };
         let id = identity(&[b"run"]);
         assert_ne!(id, identity(&[b"ru", b"n"]));
-        store.stamp(&id, vec![a.clone(), b.clone()], said.clone(), None);
+        store.stamp(&id, (seen(&a), vec![b.clone()]), said.clone(), None);
         assert_eq!(store.unchanged(&id), Some(said.clone()));
         assert_eq!(store.unchanged(&identity(&[b"other"])), None);
         fs::write(&b, "3").unwrap();
         assert_eq!(store.unchanged(&id), None);
-        store.stamp(&id, vec![a.clone(), b], said.clone(), None);
+        store.stamp(&id, (seen(&a), vec![b]), said.clone(), None);
         assert_eq!(store.unchanged(&id).as_ref(), Some(&said));
         fs::remove_file(&a).unwrap();
         assert_eq!(store.unchanged(&id), None);
-        store.stamp(&id, vec![a], said, None);
+        store.stamp(&id, (seen(&a), Vec::new()), said, None);
         assert_eq!(store.unchanged(&id), None);
     }
 
@@ -201,7 +273,7 @@ mod tests {
         let record = folder.path().join("run.ron");
         fs::write(&record, "done").unwrap();
         let id = identity(&[b"run"]);
-        store.stamp(&id, Vec::new(), Said::default(), Some((record.clone(), "cached".to_owned())));
+        store.stamp(&id, (Vec::new(), Vec::new()), Said::default(), Some((record.clone(), "cached".to_owned())));
         for _ in 0..2 {
             assert_eq!(store.unchanged(&id), Some(Said::default()));
             assert_eq!(fs::read_to_string(&record).unwrap(), "cached");
@@ -223,11 +295,11 @@ mod tests {
         };
         let id = identity(&[b"run"]);
         whole(0);
-        store.stamp(&id, vec![file.clone()], Said::default(), None);
+        store.stamp(&id, (seen(&file), Vec::new()), Said::default(), None);
         // Where the time of change is known, which has fractions, a time of modification without them says enough.
         assert_eq!(store.unchanged(&id), cfg!(unix).then(Said::default));
         whole(10);
-        store.stamp(&id, vec![file.clone()], Said::default(), None);
+        store.stamp(&id, (seen(&file), Vec::new()), Said::default(), None);
         assert_eq!(store.unchanged(&id), Some(Said::default()));
     }
 }

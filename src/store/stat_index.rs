@@ -17,7 +17,7 @@ use std::time::{Duration, SystemTime};
 use blake3::Hash;
 use serde::{Deserialize, Serialize};
 
-use super::Store;
+use super::{Store, seal};
 
 /// Modified less than this before hashing: not trusted.
 const RACY: Duration = Duration::from_secs(2);
@@ -84,7 +84,7 @@ impl StatIndex {
     /// Reads the index of this machine; a missing or damaged one is empty.
     pub fn open(store: &Store) -> Self {
         let file = store.folder("stat").join(host());
-        let known = fs::read(&file).ok().and_then(|bytes| serde_json::from_slice(&bytes).ok()).unwrap_or_default();
+        let known = known_files(&file);
         Self { file, state: Mutex::new(State { known, changed: false }) }
     }
 
@@ -153,8 +153,7 @@ impl StatIndex {
         if !state.changed {
             return;
         }
-        let mut merged: BTreeMap<PathBuf, Known> =
-            fs::read(&self.file).ok().and_then(|bytes| serde_json::from_slice(&bytes).ok()).unwrap_or_default();
+        let mut merged = known_files(&self.file);
         merged.extend(state.known.iter().map(|(path, known)| (path.clone(), known.clone())));
         if merged.len() > MAX_FILES {
             let mut ages: Vec<u64> = merged.values().map(|known| known.used).collect();
@@ -163,12 +162,18 @@ impl StatIndex {
             merged.retain(|_, known| known.used >= oldest_kept);
         }
         if let Ok(bytes) = serde_json::to_vec(&merged)
-            && let Err(error) = store.write_whole(&self.file, &bytes)
+            && let Err(error) = store.write_whole(&self.file, &seal::seal(host().as_bytes(), &bytes))
         {
             tracing::warn!(%error, "the index of file hashes was not saved");
         }
         state.changed = false;
     }
+}
+
+/// What an index file of this machine holds; nothing where it is missing, damaged or another machine's.
+fn known_files(file: &Path) -> BTreeMap<PathBuf, Known> {
+    let read = || serde_json::from_slice(seal::open(host().as_bytes(), &seal::read(file).ok()?).ok()?).ok();
+    read().unwrap_or_default()
 }
 
 /// Under which name a file is known. Where there are no inodes, a link is known by where it leads.

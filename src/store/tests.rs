@@ -79,6 +79,78 @@ fn a_damaged_entry_is_a_miss() {
 }
 
 #[test]
+fn exchanged_entries_serve_nobody_and_verify_names_them() {
+    let (_folder, store) = store();
+    let keys: Vec<Hash> = fill(&store, 2).into_iter().map(|item| item.0).collect();
+    let paths: Vec<PathBuf> = keys.iter().map(|key| store.place("ac", key)).collect();
+    let bytes: Vec<Vec<u8>> = paths.iter().map(|path| fs::read(path).unwrap()).collect();
+    fs::write(&paths[0], &bytes[1]).unwrap();
+    fs::write(&paths[1], &bytes[0]).unwrap();
+    assert!(keys.iter().all(|key| store.entry(key).is_none()));
+    assert_eq!(store.verify().unwrap().damaged.len(), 2);
+}
+
+#[test]
+fn a_name_or_an_index_of_something_else_is_not_believed() {
+    let (_folder, store) = store();
+    fill(&store, 1);
+    let mut other = entry(store.save(&artifact(b"other")).unwrap());
+    other.task = "other/fe".into();
+    store.publish(&blake3::hash(b"other"), &other).unwrap();
+    let place = |task: &str| store.place("names", &name_hash(task));
+    fs::copy(place("other/fe"), place("part/fe")).unwrap();
+    assert!(store.newest("part/fe").is_none());
+    assert!(store.newest("other/fe").is_some());
+}
+
+#[test]
+fn a_folder_in_the_place_of_a_file_is_a_miss_and_is_replaced() {
+    let (_folder, store) = store();
+    let (key, saved) = fill(&store, 1)[0];
+    for path in [store.place("ac", &key), store.place("cas", &saved.content)] {
+        fs::remove_file(&path).unwrap();
+        fs::create_dir_all(path.join("inside")).unwrap();
+    }
+    assert!(store.entry(&key).is_none() && store.load(&saved.content).is_none());
+    fill(&store, 1);
+    assert!(store.entry(&key).is_some() && store.load(&saved.content).is_some());
+}
+
+#[cfg(unix)]
+#[test]
+fn a_pipe_in_the_place_of_a_file_is_a_miss_and_is_replaced() {
+    let (_folder, store) = store();
+    let (key, saved) = fill(&store, 1)[0];
+    for path in [store.place("ac", &key), store.place("cas", &saved.content)] {
+        fs::remove_file(&path).unwrap();
+        assert!(std::process::Command::new("mkfifo").arg(&path).status().unwrap().success());
+    }
+    assert!(store.entry(&key).is_none() && store.load(&saved.content).is_none());
+    fill(&store, 1);
+    assert!(store.entry(&key).is_some() && store.load(&saved.content).is_some());
+}
+
+#[cfg(unix)]
+#[test]
+fn no_link_is_followed_for_writing() {
+    use std::os::unix::fs::symlink;
+    let (folder, outside) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let victim = outside.path().join("victim");
+    symlink(&victim, folder.path().join(TAG_FILE)).unwrap();
+    let store = Store::open(folder.path()).unwrap();
+    assert!(!victim.exists(), "the target of a dangling tag was made");
+    fs::write(&victim, "precious").unwrap();
+    let (key, saved) = fill(&store, 1)[0];
+    for path in [store.place("ac", &key), store.place("cas", &saved.content)] {
+        fs::remove_file(&path).unwrap();
+        symlink(&victim, &path).unwrap();
+    }
+    fill(&store, 1);
+    assert!(store.entry(&key).is_some() && store.load(&saved.content).is_some());
+    assert_eq!(fs::read_to_string(&victim).unwrap(), "precious");
+}
+
+#[test]
 fn gc_removes_what_was_not_used_for_long() {
     let (_folder, store) = store();
     let items = fill(&store, 3);
@@ -156,8 +228,11 @@ fn an_unchanged_file_is_not_hashed_twice_but_a_fresh_one_is() {
     // A wrong hash in the index shows who answers.
     let hex = |text: &[u8]| blake3::hash(text).to_hex().to_string();
     for entry in fs::read_dir(store.folder("stat")).unwrap().map(Result::unwrap) {
-        let text = fs::read_to_string(entry.path()).unwrap();
-        fs::write(entry.path(), text.replace(&hex(b"two"), &hex(b"index"))).unwrap();
+        let bytes = fs::read(entry.path()).unwrap();
+        let name = entry.file_name().into_string().unwrap();
+        let text = String::from_utf8(seal::open(name.as_bytes(), &bytes).unwrap().to_vec()).unwrap();
+        let wrong = text.replace(&hex(b"two"), &hex(b"index"));
+        fs::write(entry.path(), seal::seal(name.as_bytes(), wrong.as_bytes())).unwrap();
     }
     let again = StatIndex::open(&store);
     assert_eq!(again.hash(&file).unwrap(), blake3::hash(b"index"), "the stat is the same, so the index answers");

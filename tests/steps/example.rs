@@ -42,14 +42,7 @@ fn runs(step: &StepDef, folder: &Path) {
     let recipe = Recipe::load(&folder.join("example.toml"), &load, &Overrides::default()).expect("a recipe");
     let context = Context { catalog: CATALOG, check_file: &|_| Ok(()), endings: &[] };
     let plan = plan(&recipe, &context).unwrap_or_else(|problems| panic!("{}: {}", step.name, problems.render(false)));
-    let options = RunOptions {
-        name: "example".to_owned(),
-        out: folder.join("out"),
-        jobs: 1,
-        only: vec!["example".to_owned()],
-        force: Vec::new(),
-        cancelled: Arc::default(),
-    };
+    let options = RunOptions { only: vec!["example".to_owned()], ..RunOptions::new("example", folder.join("out"), 1) };
     let store = Store::open(&folder.join("cache")).expect("a store");
     let observer: Arc<dyn meshmill::run::Observer> = Arc::new(Silent);
     let outcome = run(&plan, &store, &options, &observer).expect("a run");

@@ -1,0 +1,64 @@
+//! What a run must not touch: its own inputs under any name, and whatever a link below its folder leads to.
+//!
+//! Looked at before anything runs. Two names are one file when the system says so (device and inode), so links, hard
+//! links, other spellings and other letter cases are all seen; a file that is not there yet can be nobody's input.
+
+use std::path::{Path, PathBuf};
+
+use same_file::is_same_file;
+
+use super::{RunError, RunOptions};
+use crate::plan::{Plan, Task};
+
+/// Files that the program writes into the folder of a run besides its outputs.
+const OWN: [&str; 6] = ["run.ron", "report.html", "sweep.csv", "sweep.ron", "sweep.html", "best.toml"];
+
+/// Fails where an output would replace what the run reads, or would be written through a link below the folder.
+pub(super) fn check(plan: &Plan, options: &RunOptions) -> Result<(), RunError> {
+    let sources = plan.order().filter_map(|id| match &plan.node(id).task {
+        Task::Source(source) => Some(source.path.as_path()),
+        Task::Step(_) | Task::Gate(_) => None,
+    });
+    let read: Vec<&Path> = sources.chain(options.protected.iter().map(PathBuf::as_path)).collect();
+    for output in written(plan, options) {
+        check_links(&options.out, &output)?;
+        if let Some(input) = replaced(&output, &read) {
+            return Err(RunError::WouldReplace { input: input.to_path_buf(), output });
+        }
+    }
+    Ok(())
+}
+
+/// Which of these files is the one that `output` names, by whatever alias.
+pub fn replaced<'a>(output: &Path, read: &[&'a Path]) -> Option<&'a Path> {
+    if output.symlink_metadata().is_err() {
+        return None;
+    }
+    read.iter().copied().find(|input| is_same_file(input, output).unwrap_or(false))
+}
+
+/// All that a run may write, with the pictures beside the outputs.
+fn written(plan: &Plan, options: &RunOptions) -> Vec<PathBuf> {
+    let mut files: Vec<PathBuf> = OWN.iter().map(|name| options.out.join(name)).collect();
+    for case in plan.cases() {
+        let folder = options.out.join(&case.name);
+        let failed = folder.join("failed");
+        files.push(failed.join("failed.vtu"));
+        files.extend(case.gates.iter().map(|gate| failed.join(format!("failed-{}.vtu", gate.step))));
+        for output in &case.outputs {
+            let here = [folder.join(&output.file), failed.join(&output.file)];
+            files.extend(here.iter().map(|file| file.with_extension("png")));
+            files.extend(here);
+        }
+    }
+    files
+}
+
+/// Fails where a folder between `out` and the file is a link.
+fn check_links(out: &Path, file: &Path) -> Result<(), RunError> {
+    let between = file.ancestors().skip(1).take_while(|folder| folder.starts_with(out) && *folder != out);
+    match between.filter(|folder| folder.is_symlink()).last() {
+        Some(link) => Err(RunError::Link(link.to_path_buf())),
+        None => Ok(()),
+    }
+}

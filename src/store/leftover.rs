@@ -1,0 +1,78 @@
+//! Temporary files that say whose they are, so that the next run can remove what a killed process left behind, and
+//! nothing else.
+//!
+//! The name tells machine and process. A file of this machine goes when its process is gone, one of another machine
+//! when it is a day old. Where the system does not tell which processes live, age alone decides.
+
+use std::fs;
+use std::io::{self, Write};
+use std::path::Path;
+use std::time::{Duration, SystemTime};
+
+const PREFIX: &str = ".meshmill-";
+const SUFFIX: &str = ".tmp";
+/// Leftovers of other machines go when they are this old.
+const STALE: Duration = Duration::from_hours(24);
+
+/// Writes `bytes` to a temporary file in `folder` and renames it to `path`, on the same file system. A link at `path` is
+/// replaced, not followed. Where anything fails, the temporary file is removed.
+pub fn write_by_rename(folder: &Path, path: &Path, bytes: &[u8]) -> io::Result<()> {
+    let prefix = format!("{PREFIX}{}-{}-", host(), std::process::id());
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(&prefix).suffix(SUFFIX);
+    // Temporary files are private to their owner as a rule; here the umask decides, so that a lab can share a folder.
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    let mut file = builder.tempfile_in(folder)?;
+    file.write_all(bytes)?;
+    file.persist(path).map_err(|error| error.error)?;
+    Ok(())
+}
+
+/// Removes what processes that are gone left in a folder. Whatever cannot be removed is left.
+pub fn remove_leftovers(folder: &Path) {
+    let Ok(entries) = fs::read_dir(folder) else { return };
+    for entry in entries.filter_map(Result::ok) {
+        let name = entry.file_name();
+        let Some(rest) = name.to_str().and_then(|name| name.strip_prefix(PREFIX)?.strip_suffix(SUFFIX)) else {
+            continue;
+        };
+        if is_dead(rest, &entry) {
+            let _ = fs::remove_file(entry.path());
+        }
+    }
+}
+
+fn is_dead(rest: &str, entry: &fs::DirEntry) -> bool {
+    let age = entry.metadata().and_then(|meta| meta.modified()).ok();
+    let stale = age.and_then(|time| SystemTime::now().duration_since(time).ok()).is_some_and(|age| age > STALE);
+    let process = rest.strip_prefix(&format!("{}-", host())).and_then(|rest| rest.split('-').next());
+    let gone = process.is_some_and(|process| {
+        process.parse::<u32>().is_ok() && Path::new("/proc/self").exists() && !Path::new("/proc").join(process).exists()
+    });
+    stale || gone
+}
+
+fn host() -> String {
+    let name = fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
+    name.trim().chars().filter(char::is_ascii_alphanumeric).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn what_a_dead_process_left_goes_and_nothing_else() {
+        let folder = tempfile::tempdir().unwrap();
+        let name = |process: u32| folder.path().join(format!("{PREFIX}{}-{process}-abc{SUFFIX}", host()));
+        // Process numbers end at 2^22 on Linux.
+        let (dead, alive) = (name(4_194_305), name(std::process::id()));
+        for path in [&dead, &alive, &folder.path().join("part.tmp")] {
+            fs::write(path, "x").unwrap();
+        }
+        remove_leftovers(folder.path());
+        assert!(!dead.exists() && alive.exists() && folder.path().join("part.tmp").exists());
+    }
+}

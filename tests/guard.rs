@@ -1,0 +1,186 @@
+//! Nothing that a run reads is lost, nothing outside its folder is touched, and two runs never mix.
+
+use std::fs;
+use std::path::PathBuf;
+
+use assert_cmd::Command;
+use predicates::prelude::*;
+
+const RECIPE: &str = r#"
+name = "part"
+[inputs]
+part = "cube.obj"
+[params]
+stretch = 0.1
+[steps.raw]
+use = "read"
+file = "=inputs.part"
+[steps.clean]
+use = "repair"
+from = "raw"
+[gates.clean]
+min-stretch = { at-least = "=stretch" }
+[outputs]
+clean = ["result.obj", "deep/result.vtu"]
+"#;
+
+const CUBE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1\n\
+    f 1 3 2\nf 1 4 3\nf 5 6 7\nf 5 7 8\nf 1 2 6\nf 1 6 5\nf 2 3 7\nf 2 7 6\nf 3 4 8\nf 3 8 7\nf 4 1 5\nf 4 5 8\n";
+
+struct Desk {
+    folder: tempfile::TempDir,
+}
+
+impl Desk {
+    fn new() -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        fs::write(folder.path().join("recipe.toml"), RECIPE).unwrap();
+        fs::write(folder.path().join("cube.obj"), CUBE).unwrap();
+        Self { folder }
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    fn write(&self, name: &str, text: &str) {
+        fs::create_dir_all(self.path(name).parent().unwrap()).unwrap();
+        fs::write(self.path(name), text).unwrap();
+    }
+
+    fn text(&self, name: &str) -> String {
+        fs::read_to_string(self.path(name)).unwrap()
+    }
+
+    fn run(&self, arguments: &[&str]) -> assert_cmd::assert::Assert {
+        let mut command = Command::new(assert_cmd::cargo::cargo_bin!("meshmill"));
+        command.current_dir(self.folder.path()).env("MESHMILL_CACHE", self.path("cache"));
+        command.args(["run", "recipe.toml", "--pictures", "none"]).args(arguments).assert()
+    }
+}
+
+/// The run is refused and the input is what it was, whether its gates would hold or not.
+fn refused(desk: &Desk, input: &str, out: &str) {
+    for stretch in ["stretch=0.1", "stretch=0.99"] {
+        desk.run(&["--input", &format!("part={input}"), "--out", out, "--set", stretch])
+            .code(2)
+            .stderr(predicate::str::contains("which the run reads"));
+        assert_eq!(desk.text(input), CUBE, "{input} was changed");
+    }
+}
+
+#[test]
+fn an_output_that_is_the_input_is_refused() {
+    let desk = Desk::new();
+    desk.write("o/result.obj", CUBE);
+    refused(&desk, "o/result.obj", "o");
+    refused(&desk, "o/../o/./result.obj", "o");
+    refused(&desk, "o/result.obj", "./o");
+    desk.write("o/failed/result.obj", CUBE);
+    refused(&desk, "o/failed/result.obj", "o");
+    assert!(!desk.path("o/run.ron").exists() && !desk.path("o/deep").exists(), "something was written");
+}
+
+#[cfg(unix)]
+#[test]
+fn an_output_that_is_the_input_by_a_link_is_refused() {
+    use std::os::unix::fs::symlink;
+    let desk = Desk::new();
+    fs::create_dir_all(desk.path("hard")).unwrap();
+    fs::hard_link(desk.path("cube.obj"), desk.path("hard/result.obj")).unwrap();
+    refused(&desk, "cube.obj", "hard");
+    fs::create_dir_all(desk.path("soft")).unwrap();
+    symlink("../cube.obj", desk.path("soft/result.obj")).unwrap();
+    refused(&desk, "cube.obj", "soft");
+    symlink("soft", desk.path("folder")).unwrap();
+    desk.write("soft/deep/result.vtu", "");
+    symlink(desk.path("folder/result.obj"), desk.path("input.obj")).unwrap();
+    refused(&desk, "input.obj", "folder");
+}
+
+#[test]
+fn a_recipe_a_base_or_a_lock_is_no_output() {
+    let desk = Desk::new();
+    desk.write("o/result.obj", RECIPE);
+    desk.write("recipe.toml", "name = \"part\"\nextends = \"o/result.obj\"\n[inputs]\npart = \"cube.obj\"\n");
+    desk.run(&["--out", "o"]).code(2).stderr(predicate::str::contains("o/result.obj, which the run reads"));
+    assert_eq!(desk.text("o/result.obj"), RECIPE);
+    let lock = Desk::new();
+    let mut command = Command::new(assert_cmd::cargo::cargo_bin!("meshmill"));
+    command.current_dir(lock.folder.path()).env("MESHMILL_CACHE", lock.path("cache"));
+    command.args(["lock", "recipe.toml", "--to", "cube.obj"]).assert().code(2);
+    assert_eq!(lock.text("cube.obj"), CUBE);
+    lock.run(&["--trace", "./recipe.toml"]).code(2);
+    assert_eq!(lock.text("recipe.toml"), RECIPE);
+}
+
+#[cfg(unix)]
+#[test]
+fn a_link_in_the_place_of_an_output_is_replaced_and_a_folder_that_is_one_refused() {
+    use std::os::unix::fs::symlink;
+    let desk = Desk::new();
+    desk.write("victim/result.obj", "precious");
+    fs::create_dir_all(desk.path("o")).unwrap();
+    symlink("../victim/result.obj", desk.path("o/result.obj")).unwrap();
+    desk.run(&["--out", "o"]).success();
+    assert_eq!(desk.text("victim/result.obj"), "precious");
+    assert!(!desk.path("o/result.obj").is_symlink());
+    for link in ["failed", "deep"] {
+        let desk = Desk::new();
+        desk.write("victim/result.obj", "precious");
+        fs::create_dir_all(desk.path("o")).unwrap();
+        symlink(desk.path("victim"), desk.path("o").join(link)).unwrap();
+        desk.run(&["--out", "o"]).code(2).stderr(predicate::str::contains("is a link"));
+        assert_eq!(desk.text("victim/result.obj"), "precious");
+        assert_eq!(fs::read_dir(desk.path("victim")).unwrap().count(), 1);
+    }
+}
+
+#[test]
+fn an_input_that_an_earlier_run_wrote_is_not_cleaned_away() {
+    let desk = Desk::new();
+    desk.run(&["--out", "o"]).success();
+    let other = RECIPE.replace("\"result.obj\", \"deep/result.vtu\"", "\"new.stl\"");
+    desk.write("recipe.toml", &other);
+    desk.run(&["--out", "o", "--input", "part=o/result.obj", "--set", "stretch=0.99"]).code(3);
+    assert!(desk.path("o/result.obj").exists(), "the input was taken for a stale output");
+}
+
+#[cfg(unix)]
+#[test]
+fn a_folder_that_another_run_writes_into_is_refused() {
+    let desk = Desk::new();
+    fs::create_dir_all(desk.path("o")).unwrap();
+    let other = fs::File::open(desk.path("o")).unwrap();
+    other.try_lock().unwrap();
+    desk.run(&["--out", "o"]).code(6).stderr(predicate::str::contains("another run writes into o"));
+    assert_eq!(fs::read_dir(desk.path("o")).unwrap().count(), 0);
+    drop(other);
+    desk.run(&["--out", "o"]).success();
+}
+
+#[cfg(unix)]
+#[test]
+fn a_limit_on_the_size_of_files_is_an_error_of_the_disk() {
+    let desk = Desk::new();
+    let program = assert_cmd::cargo::cargo_bin!("meshmill").display().to_string();
+    let script = format!("ulimit -f 1 && exec '{program}' run recipe.toml --out o --pictures none");
+    let mut command = Command::new("bash");
+    command.current_dir(desk.folder.path()).env("MESHMILL_CACHE", desk.path("cache")).args(["-c", &script]);
+    command.assert().code(6).stderr(predicate::str::contains("File too large"));
+    for folder in ["o", "o/deep", "cache/v1/tmp"] {
+        let Ok(entries) = fs::read_dir(desk.path(folder)) else { continue };
+        let left = entries.filter(|e| e.as_ref().unwrap().file_name().to_string_lossy().starts_with('.')).count();
+        assert_eq!(left, 0, "a temporary file stays in {folder}");
+    }
+}
+
+#[test]
+fn an_input_that_was_replaced_is_read_again() {
+    let desk = Desk::new();
+    desk.run(&["--out", "o"]).success();
+    let before = desk.text("o/result.obj");
+    desk.write("cube.obj", &CUBE.replace("v 1 1 1", "v 1 1 2"));
+    desk.run(&["--out", "o"]).success();
+    assert_ne!(desk.text("o/result.obj"), before);
+}
