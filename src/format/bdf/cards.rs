@@ -37,6 +37,9 @@ impl Card {
         if field.is_empty() {
             return Ok(0.0);
         }
+        // FORTRAN's double precision: `1.5D-3`.
+        let field: Vec<u8> = field.iter().map(|&b| if b.eq_ignore_ascii_case(&b'd') { b'e' } else { b }).collect();
+        let field = field.as_slice();
         match bare_exponent(field) {
             Some(at) => parse_number(&[&field[..at], b"e", &field[at..]].concat(), what, self.place()),
             None => parse_number(field, what, self.place()),

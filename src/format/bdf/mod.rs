@@ -6,8 +6,8 @@
 //! Reading: CTRIA3, CTRIAR, CTRIA6, CQUAD4, CQUADR and CQUAD8 become faces (of second-order elements only the corners
 //! are used), bars, beams, rods and plot elements edges of their property's group, solids are left out and counted; all
 //! other cards are skipped. Each property number is a face group, called as a comment `$HMNAME PROP 7"name"` says (the
-//! habit of several preprocessors), else `pid_7`. Grid points in a coordinate system of their own are refused, since
-//! their coordinates would be read wrong. `INCLUDE` is refused: formats open no files.
+//! habit of several preprocessors), else `pid_7`. Grid points in a coordinate system of their own, or in the default one
+//! of `GRDSET`, are placed in the basic system. `INCLUDE` is refused: formats open no files.
 //!
 //! Writing: long-field GRID cards of at most 16 characters a coordinate, which rounds some beyond their 13th digit; one
 //! property for each face group in name order, a face in several groups in the first of them, faces in none in a
@@ -16,6 +16,7 @@
 
 mod cards;
 mod read;
+mod systems;
 mod write;
 
 use super::FormatDef;

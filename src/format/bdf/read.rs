@@ -9,6 +9,7 @@ use super::super::ReadResult;
 use super::super::element::{Elements, Placed, Shape};
 use super::super::error::{FormatError, Place, Reason};
 use super::cards::{Card, Cards, Item};
+use super::systems::{Grid, Systems};
 use crate::mesh::{EdgeKey, FaceId, Soup};
 use crate::watch::Watch;
 
@@ -45,7 +46,8 @@ struct Waiting {
 
 #[derive(Default)]
 struct Deck {
-    points: Vec<DVec3>,
+    grids: Vec<Grid>,
+    systems: Systems,
     positions: FxHashMap<i64, u32>,
     elements: Vec<Waiting>,
     /// The grid numbers of all elements, one after another.
@@ -71,7 +73,7 @@ impl Deck {
                 Err(FormatError::new(card.place(), Reason::Unsupported("`INCLUDE`".into()))
                     .with_remedy("put the included cards into this file"))
             }
-            _ => Ok(()),
+            _ => self.systems.card(card).map(|_| ()),
         }
     }
 
@@ -79,19 +81,16 @@ impl Deck {
         let Some(id) = card.integer(0, "a grid number")? else {
             return Err(FormatError::unexpected(card.place(), "a grid number", b""));
         };
-        if let Some(system) = card.integer(1, "a coordinate system")?.filter(|&system| system != 0) {
-            let reason = Reason::Unsupported(format!("a grid point in coordinate system {system}"));
-            return Err(FormatError::new(card.place(), reason).with_remedy("export in the basic coordinate system"));
-        }
+        let system = card.integer(1, "a coordinate system")?;
         let [x, y, z] = [2, 3, 4].map(|field| card.number(field, "a coordinate"));
         let point = DVec3::new(x?, y?, z?);
-        let position = u32::try_from(self.points.len()).ok().filter(|&p| p != u32::MAX).ok_or_else(|| {
+        let position = u32::try_from(self.grids.len()).ok().filter(|&p| p != u32::MAX).ok_or_else(|| {
             FormatError::new(card.place(), Reason::TooMany { what: "vertices", limit: u64::from(u32::MAX) })
         })?;
         if self.positions.insert(id, position).is_some() {
             return Err(FormatError::new(card.place(), Reason::Duplicate { what: "grid point", id }));
         }
-        self.points.push(point);
+        self.grids.push(Grid { point, system, line: card.line });
         Ok(())
     }
 
@@ -130,8 +129,10 @@ impl Deck {
         }
     }
 
-    fn finish(self) -> ReadResult {
-        let mut gathered = Elements::new(self.points.len());
+    fn finish(mut self) -> ReadResult {
+        let grid = |id: i64| self.positions.get(&id).map(|&at| at as usize);
+        let points = std::mem::take(&mut self.systems).place(&self.grids, &grid)?;
+        let mut gathered = Elements::new(points.len());
         let mut faces: BTreeMap<i64, Vec<FaceId>> = BTreeMap::new();
         let mut edges: BTreeMap<i64, Vec<EdgeKey>> = BTreeMap::new();
         let mut positions = Vec::new();
@@ -142,13 +143,13 @@ impl Deck {
                 positions.push(self.position(node, element.line)?);
             }
             start = element.end;
-            match gathered.add(element.shape, &positions, &self.points) {
+            match gathered.add(element.shape, &positions, &points) {
                 Placed::Faces(range) => faces.entry(element.property).or_default().extend(range.map(FaceId::new)),
                 Placed::Edge(edge) if edge[0] != edge[1] => edges.entry(element.property).or_default().push(edge),
                 Placed::Edge(_) | Placed::Vertex(_) | Placed::Nothing => {}
             }
         }
-        let mut soup = Soup { points: self.points.into(), ..Soup::default() };
+        let mut soup = Soup { points: points.into(), ..Soup::default() };
         let name = |id: i64| self.names.get(&id).cloned().unwrap_or_else(|| format!("pid_{id}"));
         let groups = &mut soup.carried.groups;
         for (id, members) in faces {
@@ -169,7 +170,7 @@ impl Deck {
     }
 
     fn position(&self, node: i64, line: u64) -> Result<u32, FormatError> {
-        let reason = Reason::OutOfRange { what: "grid point", index: node, count: self.points.len() as u64 };
+        let reason = Reason::OutOfRange { what: "grid point", index: node, count: self.grids.len() as u64 };
         self.positions.get(&node).copied().ok_or_else(|| FormatError::new(Place::Line(line), reason))
     }
 }

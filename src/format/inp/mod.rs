@@ -8,7 +8,8 @@
 //! beams), `*NSET` a vertex group, `*SURFACE` a face group, of nodes a vertex group, of element sides `E1` to `E4` an
 //! edge group. Sets may list numbers, ranges (`GENERATE`) and other sets. Names are compared without regard to case, and
 //! keep the case of their first use. Parts have numbers of their own; an instance may be moved, but used once only.
-//! A set named `Eall` or `Nall` that holds everything is no group. `*INCLUDE` is refused: formats open no files.
+//! A set named `Eall` or `Nall` that holds everything is no group. `*INCLUDE` is refused: formats open no files. So are cards
+//! that make, copy or move nodes or elements, by name: passed over, they would leave another mesh.
 //!
 //! Writing: nodes, elements by type in the set `Eall`, an `*ELSET` and a `*SURFACE` (positive side) for each face group
 //! and region, an `*NSET` for each vertex group and for the nodes of each edge group, since no solver agrees with

@@ -67,6 +67,13 @@ struct Reader {
     missing: usize,
 }
 
+/// Cards that create, copy, move or join nodes, elements or sets: passing over them would give another mesh.
+const MAKES_GEOMETRY: [&str; 9] =
+    ["NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY", "IMPORT", "IMPERFECTION", "SYMMETRIC MODEL GENERATION"];
+
+/// Cards whose data may stand in another file.
+const TAKES_A_FILE: [&str; 5] = ["NODE", "ELEMENT", "NSET", "ELSET", "SURFACE"];
+
 /// Reads an input file.
 pub(super) fn read(bytes: &[u8], watch: &Watch) -> Result<(Soup, ReadCounts), FormatError> {
     let mut reader = Reader {
@@ -125,6 +132,13 @@ impl Reader {
             .map(|(k, v)| (k.trim().to_ascii_uppercase(), v.trim().trim_matches('"')))
             .collect();
         let value = |key: &str| parameters.iter().find(|(k, _)| k == key).map(|&(_, v)| v);
+        if let (true, Some(file)) = (TAKES_A_FILE.contains(&name.as_str()), value("INPUT").or_else(|| value("FILE"))) {
+            return Err(FormatError::new(
+                place,
+                Reason::Unsupported(format!("data of *{name} in another file ({file})")),
+            )
+            .with_remedy("put the file's lines below the card"));
+        }
         self.block = match name.as_str() {
             "NODE" => {
                 if value("SYSTEM").is_some_and(|s| !s.eq_ignore_ascii_case("R")) {
@@ -158,6 +172,13 @@ impl Reader {
             "SYSTEM" => {
                 return Err(FormatError::new(place, Reason::Unsupported("*SYSTEM".into()))
                     .with_remedy("write the nodes in global coordinates"));
+            }
+            name if MAKES_GEOMETRY.contains(&name) => {
+                return Err(FormatError::new(
+                    place,
+                    Reason::Unsupported(format!("*{name}, which makes or moves parts of the mesh,")),
+                )
+                .with_remedy("let the program that wrote the deck write out its nodes, elements and sets"));
             }
             "PART" => {
                 let name = value("NAME").unwrap_or("").to_owned();
