@@ -203,7 +203,9 @@ fn the_smaller_commands_answer() {
     }
     desk.meshmill(&["measure", "cube.obj"]).assert().success().stdout(predicate::str::contains("volume"));
     let json = desk.meshmill(&["measure", "cube.obj", "--json"]).assert().success().get_output().stdout.clone();
-    serde_json::from_slice::<serde_json::Value>(&json).unwrap();
+    let json: serde_json::Value = serde_json::from_slice(&json).unwrap();
+    assert_eq!((&json["metrics"]["faces"], &json["metrics"]["closed"]), (&12.into(), &true.into()));
+    assert_eq!((&json["metrics"]["area"], &json["units"]["area"]), (&6.0.into(), &"area".into()));
     desk.meshmill(&["convert", "cube.obj", "cube.ply"]).assert().success();
     let measured = desk.meshmill(&["measure", "cube.ply", "--reference", "cube.obj"]).assert().success();
     measured.stdout(predicate::str::contains("distance"));

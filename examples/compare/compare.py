@@ -106,7 +106,7 @@ class Meshmill:
 
     def measure(self, source):
         done = subprocess.run([self.binary, "measure", str(source), "--json"], capture_output=True, text=True, check=True)
-        values = {k: next(iter(v.values())) for k, v in json.loads(done.stdout)["values"].items()}
+        values = json.loads(done.stdout)["metrics"]
         return {"vertices": values["vertices"], "faces": values["faces"], "closed": values["closed"],
                 "manifold": values["manifold"], "area": values["area"],
                 "volume": values["volume"] if values["closed"] else None}

@@ -119,9 +119,14 @@ fn holdings(soup: &Soup) -> [(&'static str, Vec<(String, usize)>); 5] {
 /// Some names in a line.
 fn shortened(names: &[&str]) -> String {
     const MOST: usize = 5;
-    let shown: Vec<String> = names.iter().take(MOST).map(|name| format!("`{name}`")).collect();
+    let shown: Vec<String> = names.iter().take(MOST).map(|name| format!("`{}`", printable(name))).collect();
     let more = if names.len() > MOST { format!(" and {} more", names.len() - MOST) } else { String::new() };
     shown.join(", ") + &more
+}
+
+/// A name from a file, fit for a terminal: control characters, which could steer it, as escapes.
+fn printable(name: &str) -> String {
+    name.chars().flat_map(|c| if c.is_control() { c.escape_default().collect() } else { vec![c] }).collect()
 }
 
 /// Reads a mesh file of any format.

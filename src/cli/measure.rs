@@ -6,6 +6,7 @@ use super::convert::read_mesh;
 use super::exit::{Exit, Fault, data};
 use super::signals::Interrupt;
 use crate::metric::measure;
+use crate::report::measure::flat;
 use crate::report::table;
 use crate::run::Silent;
 use crate::watch::Watch;
@@ -18,7 +19,7 @@ pub(super) struct Arguments {
     /// The mesh to compare with.
     #[arg(long, value_name = "MESH")]
     reference: Option<PathBuf>,
-    /// Print one JSON document.
+    /// Print one JSON document: `metrics`, numbers and booleans by name, and `units`, the unit of each that has one.
     #[arg(long, conflicts_with = "ron")]
     json: bool,
     /// Print RON.
@@ -36,7 +37,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Fault> {
     };
     let fault = |error: String| Fault::new(Exit::Fault, format!("cannot write the metrics: {error}"));
     if arguments.json {
-        data(&serde_json::to_string_pretty(&metrics).map_err(|error| fault(error.to_string()))?);
+        data(&serde_json::to_string_pretty(&flat(&metrics)).map_err(|error| fault(error.to_string()))?);
     } else if arguments.ron {
         let config = ron::ser::PrettyConfig::default();
         data(&ron::ser::to_string_pretty(&metrics, config).map_err(|error| fault(error.to_string()))?);

@@ -47,6 +47,9 @@ pub fn plan_cases(
         }
     }
     if problems.is_empty() {
+        problems = recipe.unused();
+    }
+    if problems.is_empty() {
         Ok(builder.finish())
     } else {
         Err(Diagnostics::new(Arc::clone(&recipe.sources), problems))

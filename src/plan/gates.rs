@@ -6,7 +6,7 @@ use super::bind::BoundDecl;
 use super::case::CaseContext;
 use super::wire::{Producer, Wiring, producer};
 use crate::metric::gate::{Check, Limit, judges_faces};
-use crate::metric::registry::{METRICS, MetricDef, Needs, Unit, find};
+use crate::metric::registry::{Direction, METRICS, MetricDef, Needs, Unit, find};
 use crate::recipe::suggest::did_you_mean;
 use crate::recipe::{Diagnostic, Entry, Node, Table, Tree};
 use crate::step::Port;
@@ -142,8 +142,31 @@ fn limits(
         }
     } else {
         check.equals = limit(metric, "equals", value, context);
+        if !matches!(metric.unit, Unit::Flag | Unit::Count)
+            && let Some(number) = check.equals.take()
+        {
+            context.problems.push(bare_number(metric, &number, value));
+        }
     }
     (check, reference)
+}
+
+/// A number without a word means equality, which no measured length or ratio ever has, and is never what was meant.
+fn bare_number(metric: &MetricDef, limit: &Limit, value: &Tree) -> Diagnostic {
+    let name = metric.name;
+    let written = match limit {
+        Limit::Percent(percent) => format!("\"{percent}%\""),
+        Limit::Number(number) => number.to_string(),
+        Limit::Flag(flag) => flag.to_string(),
+    };
+    let side = match metric.direction {
+        Direction::Higher => format!("{{ at-least = {written} }}"),
+        Direction::Lower => format!("{{ at-most = {written} }}"),
+        Direction::Neutral => format!("{{ at-least = {written} }} or {{ at-most = {written} }}"),
+    };
+    let message = format!("`{name} = {written}` does not say on which side of the limit a mesh must be");
+    let help = format!("write {name} = {side}, or {{ equals = {written} }} if it must be just that");
+    Diagnostic::error(value.span, message).help(help)
 }
 
 /// What a check lacks.

@@ -14,6 +14,7 @@ pub mod suggest;
 #[cfg(test)]
 mod tests;
 pub mod tree;
+mod unused;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -155,6 +156,11 @@ impl Recipe {
             Node::Text(text) => Some(self.sources.folder(value.span).join(text)),
             Node::Number(_) | Node::Bool(_) | Node::Date(_) | Node::List(_) | Node::Table(_) => None,
         }
+    }
+
+    /// One problem for each parameter that nothing uses. Only a recipe that is right otherwise can tell.
+    pub fn unused(&self) -> Vec<Diagnostic> {
+        unused::unused(self)
     }
 
     /// The step of this name.
