@@ -213,3 +213,23 @@ fn killed_in_the_middle_a_sweep_goes_on_from_the_last_finished_task() {
     assert!(desk.start("other").wait().unwrap().success());
     assert_eq!(contents(&desk.path("out")), contents(&desk.path("other")));
 }
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_file_that_fits_a_pattern_and_cannot_be_used_is_named() {
+    use std::os::unix::ffi::OsStrExt;
+    let desk = Desk::new();
+    fs::create_dir(desk.path("parts")).unwrap();
+    fs::copy(desk.path("cube.obj"), desk.path("parts/good.obj")).unwrap();
+    let list = |code: i32| {
+        desk.sweep(&["-s", "inputs.part=parts/*.obj", "--list"]).assert().code(code).get_output().stderr.clone()
+    };
+    list(0);
+    let link = desk.path("parts/broken.obj");
+    std::os::unix::fs::symlink("nowhere", &link).unwrap();
+    assert!(String::from_utf8_lossy(&list(2)).contains("leads nowhere"));
+    fs::remove_file(&link).unwrap();
+    let name = std::ffi::OsStr::from_bytes(b"lat\xe4.obj");
+    fs::copy(desk.path("cube.obj"), desk.path("parts").join(name)).unwrap();
+    assert!(String::from_utf8_lossy(&list(2)).contains("not UTF-8"));
+}

@@ -77,14 +77,45 @@ pub(super) fn plan_cases(
     Ok(plan::plan_cases(recipe, cases, columns, &context)?)
 }
 
-/// The files below a folder that fit a pattern, sorted, at most so many.
+/// The files below a folder that fit a pattern, sorted, at most so many. What fits and cannot be used is an error: a study
+/// that leaves out parts without a word is wrong.
 pub(super) fn list_files(folder: &Path, pattern: &str, most: usize) -> Result<Vec<PathBuf>, String> {
     let folder = glob::Pattern::escape(&folder.to_string_lossy());
     let pattern = Path::new(&folder).join(pattern);
     let found = glob::glob(&pattern.to_string_lossy()).map_err(|error| error.msg.to_owned())?;
-    let mut files: Vec<PathBuf> = found.filter_map(Result::ok).filter(|path| path.is_file()).take(most).collect();
+    let mut files = Vec::new();
+    for path in found.take(most) {
+        let path = path.map_err(|error| format!("cannot read {}", error.path().display()))?;
+        if path.is_symlink() && !path.exists() {
+            return Err(format!("{} fits the pattern and is a link that leads nowhere", path.display()));
+        }
+        if path.is_file() {
+            files.push(path);
+        }
+    }
+    unreadable_names(&pattern)?;
     files.sort();
     Ok(files)
+}
+
+/// Fails where a name that is not UTF-8, which patterns pass over, fits one as far as it can be read.
+fn unreadable_names(pattern: &Path) -> Result<(), String> {
+    let (Some(parent), Some(name)) = (pattern.parent(), pattern.file_name()) else { return Ok(()) };
+    let (parent, name) = (parent.to_string_lossy(), name.to_string_lossy());
+    let Ok(name) = glob::Pattern::new(&name) else { return Ok(()) };
+    let parent = if parent.is_empty() { ".".into() } else { parent };
+    let folders = glob::glob(&parent).map_err(|error| error.msg.to_owned())?;
+    for folder in folders.filter_map(Result::ok) {
+        let Ok(entries) = fs::read_dir(&folder) else { continue };
+        for entry in entries.filter_map(Result::ok) {
+            let file = entry.file_name();
+            if file.to_str().is_none() && name.matches(&file.to_string_lossy()) {
+                let file = folder.join(&file);
+                return Err(format!("the name {file:?} fits the pattern and is not UTF-8; rename the file"));
+            }
+        }
+    }
+    Ok(())
 }
 
 impl Planned {
