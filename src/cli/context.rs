@@ -111,7 +111,8 @@ fn unreadable_names(pattern: &Path) -> Result<(), String> {
             let file = entry.file_name();
             if file.to_str().is_none() && name.matches(&file.to_string_lossy()) {
                 let file = folder.join(&file);
-                return Err(format!("the name {file:?} fits the pattern and is not UTF-8; rename the file"));
+                let message = "fits the pattern, but its name is not UTF-8; rename it";
+                return Err(format!("{} {message}", file.display()));
             }
         }
     }
