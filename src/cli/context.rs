@@ -130,7 +130,8 @@ impl Planned {
         texts.chain(read).collect()
     }
 
-    /// All of them as they are now, before the run reads them. A recipe counts only while its file holds the text that was planned.
+    /// All of them as they are now, before the run reads them. A recipe counts only while its file holds the text that
+    /// was planned.
     pub(super) fn seen(&self) -> Vec<Seen> {
         let texts = texts(&self.recipe);
         let see = |file: PathBuf| {

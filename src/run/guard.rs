@@ -3,7 +3,10 @@
 //! Looked at before anything runs. Two names are one file when the system says so (device and inode), so links, hard
 //! links, other spellings and other letter cases are all seen; a file that is not there yet can be nobody's input.
 
+use std::collections::BTreeMap;
+use std::fs;
 use std::path::{Path, PathBuf};
+use std::time::SystemTime;
 
 use same_file::is_same_file;
 
@@ -20,13 +23,24 @@ pub(super) fn check(plan: &Plan, options: &RunOptions) -> Result<(), RunError> {
         Task::Step(_) | Task::Gate(_) => None,
     });
     let read: Vec<&Path> = sources.chain(options.protected.iter().map(PathBuf::as_path)).collect();
+    let mut by_stat: BTreeMap<(u64, Option<SystemTime>), Vec<&Path>> = BTreeMap::new();
+    for &input in &read {
+        by_stat.entry(fingerprint(input).unwrap_or_default()).or_default().push(input);
+    }
     for output in written(plan, options) {
         check_links(&options.out, &output)?;
-        if let Some(input) = replaced(&output, &read) {
+        // One file has one size and time by all its names, so that few are looked at closely.
+        let Some(alike) = fingerprint(&output).and_then(|stat| by_stat.get(&stat)) else { continue };
+        if let Some(input) = replaced(&output, alike) {
             return Err(RunError::WouldReplace { input: input.to_path_buf(), output });
         }
     }
     Ok(())
+}
+
+/// Size and time of the file that a name leads to.
+fn fingerprint(path: &Path) -> Option<(u64, Option<SystemTime>)> {
+    fs::metadata(path).ok().map(|meta| (meta.len(), meta.modified().ok()))
 }
 
 /// Which of these files is the one that `output` names, by whatever alias.

@@ -1,8 +1,8 @@
 //! Small files of the store that cannot be taken for another: a checksum over what they hold and the name they have.
 //!
-//! A file is one line, `MAGIC CHECKSUM`, and the body. The checksum is BLAKE3 over the length of the name, the name and the body, where
-//! the name is what the file was written for: the key of an entry, the machine of an index. A file that was copied or
-//! moved to another name, cut short or changed, opens nowhere.
+//! A file is one line, `MAGIC CHECKSUM`, and the body. The checksum is BLAKE3 over the length of the name, the name and
+//! the body, where the name is what the file was written for: the key of an entry, the machine of an index. A file that
+//! was copied or moved to another name, cut short or changed, opens nowhere.
 
 use std::fs;
 use std::io;
