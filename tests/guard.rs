@@ -168,7 +168,7 @@ fn a_limit_on_the_size_of_files_is_an_error_of_the_disk() {
     let mut command = Command::new("bash");
     command.current_dir(desk.folder.path()).env("MESHMILL_CACHE", desk.path("cache")).args(["-c", &script]);
     command.assert().code(6).stderr(predicate::str::contains("File too large"));
-    for folder in ["o", "o/deep", "cache/v1/tmp"] {
+    for folder in ["o", "o/deep", "cache/v2/tmp"] {
         let Ok(entries) = fs::read_dir(desk.path(folder)) else { continue };
         let left = entries.filter(|e| e.as_ref().unwrap().file_name().to_string_lossy().starts_with('.')).count();
         assert_eq!(left, 0, "a temporary file stays in {folder}");
@@ -183,4 +183,74 @@ fn an_input_that_was_replaced_is_read_again() {
     desk.write("cube.obj", &CUBE.replace("v 1 1 1", "v 1 1 2"));
     desk.run(&["--out", "o"]).success();
     assert_ne!(desk.text("o/result.obj"), before);
+}
+
+#[cfg(unix)]
+#[test]
+fn what_lies_behind_a_link_or_above_the_folder_is_not_cleaned_away() {
+    let desk = Desk::new();
+    desk.run(&["--out", "o"]).success();
+    desk.write("recipe.toml", &RECIPE.replace(", \"deep/result.vtu\"", ""));
+    fs::rename(desk.path("o/deep"), desk.path("mine")).unwrap();
+    std::os::unix::fs::symlink("../mine", desk.path("o/deep")).unwrap();
+    fs::copy(desk.path("o/result.obj"), desk.path("copy.obj")).unwrap();
+    let record = desk.text("o/run.ron").replace("o/result.obj", "o/../copy.obj");
+    desk.write("o/run.ron", &record);
+    desk.run(&["--out", "o", "--set", "stretch=0.99"]).code(3);
+    assert!(desk.path("mine/result.vtu").exists(), "a file was deleted through a link");
+    assert!(desk.path("copy.obj").exists(), "a file above the folder was deleted");
+}
+
+#[test]
+fn a_lock_is_not_replaced_by_what_a_run_writes_nor_a_result_by_a_lock() {
+    let desk = Desk::new();
+    let lock = |arguments: &[&str]| {
+        let mut command = Command::new(assert_cmd::cargo::cargo_bin!("meshmill"));
+        command.current_dir(desk.folder.path()).env("MESHMILL_CACHE", desk.path("cache"));
+        command.args(["lock", "recipe.toml"]).args(arguments).assert()
+    };
+    lock(&["--out", "o"]).success();
+    let text = desk.text("part.lock.ron");
+    desk.run(&["--out", "o", "--trace", "part.lock.ron"]).code(2);
+    assert_eq!(desk.text("part.lock.ron"), text);
+    fs::copy(desk.path("part.lock.ron"), desk.path("o/report.html")).unwrap();
+    desk.run(&["--out", "o", "--locked=o/report.html", "--report"]).code(2);
+    assert_eq!(desk.text("o/report.html"), text);
+    let result = desk.text("o/result.obj");
+    lock(&["--out", "o", "--to", "o/result.obj"]).code(2);
+    assert_eq!(desk.text("o/result.obj"), result);
+}
+
+#[cfg(unix)]
+#[test]
+fn a_pipe_in_the_place_of_an_output_is_replaced() {
+    let desk = Desk::new();
+    fs::create_dir_all(desk.path("o")).unwrap();
+    assert!(std::process::Command::new("mkfifo").arg(desk.path("o/result.obj")).status().unwrap().success());
+    desk.run(&["--out", "o"]).success();
+    assert!(fs::symlink_metadata(desk.path("o/result.obj")).unwrap().is_file());
+}
+
+#[test]
+fn an_input_replaced_during_a_run_is_noticed_by_the_next() {
+    let desk = Desk::new();
+    let slow = "[steps.fine]\nuse = \"subdivide\"\nfrom = \"clean\"\ntimes = 7\n[steps.finer]\nuse = \"features\"\nfrom = \"fine\"\n";
+    let recipe = RECIPE.replace("[gates.clean]", &format!("{slow}[gates.clean]"));
+    desk.write("recipe.toml", &recipe.replace("[outputs]\n", "[outputs]\nfiner = [\"finer.vtu\"]\n"));
+    let mut child = std::process::Command::new(assert_cmd::cargo::cargo_bin!("meshmill"))
+        .current_dir(desk.folder.path())
+        .env("MESHMILL_CACHE", desk.path("cache"))
+        .args(["run", "recipe.toml", "--pictures", "none", "--out", "o", "-q"])
+        .spawn()
+        .unwrap();
+    // The first result is there, so the part was read.
+    let entries = || fs::read_dir(desk.path("cache/v2/ac")).map_or(0, Iterator::count);
+    while entries() == 0 && child.try_wait().unwrap().is_none() {
+        std::thread::sleep(std::time::Duration::from_millis(1));
+    }
+    desk.write("cube.obj", &CUBE.replace("v 1 1 1", "v 1 1 2"));
+    assert!(child.wait().unwrap().success());
+    desk.run(&["--out", "o", "-q"]).success();
+    desk.run(&["--out", "fresh", "-q"]).success();
+    assert_eq!(desk.text("o/result.obj"), desk.text("fresh/result.obj"));
 }

@@ -250,7 +250,7 @@ fn a_second_run_does_no_step_and_writes_no_file() {
     let before = files(&bench.path("out"));
     assert_eq!(before.len(), 3);
     // Without blobs the second run can only succeed when it loads none.
-    fs::remove_dir_all(bench.path("cache/v1/cas")).unwrap();
+    fs::remove_dir_all(bench.path("cache/v2/cas")).unwrap();
     let again = bench.run(CHAIN, &[]);
     expect(&again, &[("raw", Cached), ("scaled", Cached), ("rounded", Cached), ("last", Cached)]);
     assert!(again.1.files.iter().all(|file| file.state == FileState::Current));
@@ -312,7 +312,7 @@ fn damaged_and_missing_blobs_are_computed_again() {
     let bench = Bench::new();
     bench.run(CHAIN, &[]);
     let expected = files(&bench.path("out"));
-    for shard in fs::read_dir(bench.path("cache/v1/cas")).unwrap() {
+    for shard in fs::read_dir(bench.path("cache/v2/cas")).unwrap() {
         for blob in fs::read_dir(shard.unwrap().path()).unwrap() {
             fs::write(blob.unwrap().path(), b"damaged").unwrap();
         }

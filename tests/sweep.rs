@@ -189,7 +189,7 @@ fn two_sweeps_at_once_give_the_same_bytes() {
 fn killed_in_the_middle_a_sweep_goes_on_from_the_last_finished_task() {
     let desk = Desk::new();
     let mut child = desk.start("out");
-    let results = || fs::read_dir(desk.path("cache/v1/cas")).map_or(0, Iterator::count);
+    let results = || fs::read_dir(desk.path("cache/v2/cas")).map_or(0, Iterator::count);
     let end = Instant::now() + Duration::from_mins(1);
     while results() < 4 && child.try_wait().unwrap().is_none() && Instant::now() < end {
         std::thread::sleep(Duration::from_millis(1));
@@ -197,10 +197,10 @@ fn killed_in_the_middle_a_sweep_goes_on_from_the_last_finished_task() {
     child.kill().unwrap();
     child.wait().unwrap();
     let stored = |folder: &str| -> Vec<(String, std::time::SystemTime)> {
-        contents(&desk.path("cache/v1").join(folder))
+        contents(&desk.path("cache/v2").join(folder))
             .into_iter()
             .map(|(name, _)| {
-                let time = fs::metadata(desk.path("cache/v1").join(folder).join(&name)).unwrap().modified().unwrap();
+                let time = fs::metadata(desk.path("cache/v2").join(folder).join(&name)).unwrap().modified().unwrap();
                 (name, time)
             })
             .collect()

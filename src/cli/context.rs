@@ -141,9 +141,10 @@ impl Planned {
         self.files().into_iter().map(see).collect()
     }
 
-    /// Fails where a file that is to be written is one of those that are read, by whatever name.
-    pub(super) fn check_replaces(&self, file: &Path) -> Result<(), Fault> {
-        let read = self.files();
+    /// Fails where a file that is to be written is one of those that are read, or of `others`, by whatever name.
+    pub(super) fn check_replaces(&self, file: &Path, others: &[PathBuf]) -> Result<(), Fault> {
+        let mut read = self.files();
+        read.extend_from_slice(others);
         let read: Vec<&Path> = read.iter().map(PathBuf::as_path).collect();
         match run::replaced(file, &read) {
             Some(input) => {

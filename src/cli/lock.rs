@@ -54,9 +54,10 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Fault>
     let planned = arguments.recipe.plan()?;
     let store = open_store(global)?;
     let interrupt = Interrupt::listen();
-    let options = options(&planned, arguments.out.as_deref(), arguments.jobs, &interrupt)?;
+    let mut options = options(&planned, arguments.out.as_deref(), arguments.jobs, &interrupt)?;
     let file = arguments.to.clone().unwrap_or_else(|| lock_file(&planned.recipe));
-    planned.check_replaces(&file)?;
+    planned.check_replaces(&file, &[])?;
+    options.protected.push(file.clone());
     let _claim = run::claim(&options.out)?;
     let before = ingredients(&planned.recipe.name, &planned.plan, &run::records(&planned.plan, &store, &options));
     let (report, cancelled) = execute(&planned, &store, &options, global, (None, Pictures::default()))?;
@@ -73,6 +74,8 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Fault>
     let tolerance = if class == Class::Tolerance { arguments.tolerance } else { 0.0 };
     let lock = Lock { class, tolerance, ..before.with_results(&report, &options.out) };
     let text = lock.to_ron().map_err(|error| Fault::new(Exit::Fault, format!("cannot write the lock: {error}")))?;
+    let written: Vec<PathBuf> = report.written().collect();
+    planned.check_replaces(&file, &written)?;
     run::write_named(&file, text.as_bytes())?;
     if !global.quiet {
         say(&format!("{}: locked {} tasks and {} files", file.display(), lock.tasks.len(), lock.files.len()));

@@ -71,8 +71,11 @@ pub(super) fn once(arguments: &Arguments, global: &Global, interrupt: &Interrupt
     planned.check_steps("--force", &arguments.force)?;
     let store = open_store(global)?;
     let mut options = options(&planned, arguments.out.as_deref(), arguments.jobs, interrupt)?;
+    if let Some(lock) = arguments.locked.as_ref().filter(|lock| !lock.is_empty()) {
+        options.protected.push(PathBuf::from(lock));
+    }
     if let Some(file) = &arguments.trace {
-        planned.check_replaces(file)?;
+        planned.check_replaces(file, &options.protected)?;
     }
     let _claim = run::claim(&options.out)?;
     options.only.clone_from(&arguments.only);
@@ -141,7 +144,7 @@ fn remove_stale(report: &Report, out: &Path, read: &[PathBuf]) {
     let read: Vec<&Path> = read.iter().map(PathBuf::as_path).collect();
     for file in last.cases.iter().flat_map(|case| &case.files) {
         let path = Path::new(&file.path);
-        if !path.starts_with(out) || run::replaced(path, &read).is_some() {
+        if !run::is_inside(out, path) || run::replaced(path, &read).is_some() {
             continue;
         }
         let Some(content) = file.content.as_ref().filter(|_| !there.contains(path)) else { continue };

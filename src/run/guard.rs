@@ -5,7 +5,7 @@
 
 use std::collections::BTreeMap;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 use std::time::SystemTime;
 
 use same_file::is_same_file;
@@ -49,6 +49,12 @@ pub fn replaced<'a>(output: &Path, read: &[&'a Path]) -> Option<&'a Path> {
         return None;
     }
     read.iter().copied().find(|input| is_same_file(input, output).unwrap_or(false))
+}
+
+/// Whether a file lies in the folder of a run, reached by plain folders alone: by no link, and by no way back up.
+pub fn is_inside(out: &Path, file: &Path) -> bool {
+    let below = |rest: &Path| rest.components().all(|part| matches!(part, Component::Normal(_)));
+    file.strip_prefix(out).is_ok_and(below) && check_links(out, file).is_ok()
 }
 
 /// All that a run may write, with the pictures beside the outputs.

@@ -39,7 +39,7 @@ use std::sync::atomic::AtomicBool;
 
 pub use board::TaskState;
 pub use claim::{Claim, claim};
-pub use guard::replaced;
+pub use guard::{is_inside, replaced};
 pub use observe::{Event, Observer, Silent};
 pub use outcome::{FileOutcome, FileState, RunOutcome, TaskOutcome};
 pub use preview::{Explained, Forecast, explain, preview, records};
@@ -131,8 +131,9 @@ pub fn write_file(path: &std::path::Path, bytes: &[u8]) -> Result<(), RunError> 
     whole::write(path, bytes).map_err(|source| RunError::Output { action: "write", path: path.to_path_buf(), source })
 }
 
-/// The same for a file that the user named: where that is a link, what it leads to is written.
+/// The same for a file that the user named: where that is a link, what it leads to is written, and a device or a pipe is
+/// written to as it is.
 pub fn write_named(path: &std::path::Path, bytes: &[u8]) -> Result<(), RunError> {
-    let real = std::fs::canonicalize(path);
-    write_file(real.as_deref().unwrap_or(path), bytes)
+    let written = whole::write_named(path, bytes);
+    written.map_err(|source| RunError::Output { action: "write", path: path.to_path_buf(), source })
 }

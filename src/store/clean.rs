@@ -12,7 +12,7 @@ use std::time::{Duration, SystemTime};
 use blake3::Hash;
 use serde::Serialize;
 
-use super::{Entry, Store, StoreError, TAG_FILE, seal, verified};
+use super::{EARLIER, Entry, Store, StoreError, TAG_FILE, seal, verified};
 
 /// Files that somebody may be about to name are left alone for this long.
 const GRACE: Duration = Duration::from_hours(1);
@@ -141,6 +141,11 @@ impl Store {
             let path = self.folder(folder);
             fs::remove_dir_all(&path).map_err(StoreError::io("remove", &path))?;
         }
+        for path in EARLIER.map(|name| self.root.join(name)) {
+            if fs::symlink_metadata(&path).is_ok_and(|meta| meta.is_dir()) {
+                fs::remove_dir_all(&path).map_err(StoreError::io("remove", &path))?;
+            }
+        }
         Self::open(&self.root)?;
         Ok(CleanReport { entries: stat.entries, blobs: stat.blobs, bytes: stat.bytes, damaged: Vec::new() })
     }
@@ -149,7 +154,7 @@ impl Store {
         let mut items = Vec::new();
         let root = self.folder(folder);
         let shards = fs::read_dir(&root).map_err(StoreError::io("read", &root))?;
-        for shard in shards.filter_map(Result::ok).filter(|entry| entry.path().is_dir()) {
+        for shard in shards.filter_map(Result::ok).filter(|entry| entry.file_type().is_ok_and(|kind| kind.is_dir())) {
             for (path, meta) in files(&shard.path())? {
                 let hash = path.file_name().and_then(|name| name.to_str()).and_then(|name| Hash::from_hex(name).ok());
                 if let (Some(hash), Ok(modified)) = (hash, meta.modified()) {
@@ -161,12 +166,16 @@ impl Store {
         Ok(items)
     }
 
+    /// Files of the dead, and folders that were moved out of the place of a file.
     fn remove_leftovers(&self, now: SystemTime, dry_run: bool) -> Result<(), StoreError> {
-        for (path, meta) in files(&self.folder("tmp"))? {
+        let tmp = self.folder("tmp");
+        let entries = fs::read_dir(&tmp).map_err(StoreError::io("read", &tmp))?;
+        for entry in entries.filter_map(Result::ok).filter(|_| !dry_run) {
+            let Ok(meta) = entry.metadata() else { continue };
             let age = meta.modified().ok().and_then(|time| now.duration_since(time).ok());
-            if !dry_run && age.is_some_and(|age| age > GRACE) {
+            if age.is_some_and(|age| age > GRACE) {
                 // Somebody else may have removed it meanwhile.
-                let _ = fs::remove_file(path);
+                let _ = if meta.is_dir() { fs::remove_dir_all(entry.path()) } else { fs::remove_file(entry.path()) };
             }
         }
         Ok(())

@@ -2,12 +2,12 @@
 //!
 //! ```text
 //! ROOT/CACHEDIR.TAG           tells backup programs to skip the folder, and `clear` that it is ours
-//! ROOT/v1/ac/ab/abcd...       entry: what the task of this key gave, by content hash; published last
-//! ROOT/v1/cas/ef/efgh...      blob: a packed artifact under its content hash
-//! ROOT/v1/names/..            key of the newest result of a task name, for explanations only
-//! ROOT/v1/stat/HOST           content hashes of files by their stat, one small file a machine
-//! ROOT/v1/stat/HOST-run-..    stamps of whole runs
-//! ROOT/v1/tmp/..              files being written
+//! ROOT/v2/ac/ab/abcd...       entry: what the task of this key gave, by content hash; published last
+//! ROOT/v2/cas/ef/efgh...      blob: a packed artifact under its content hash
+//! ROOT/v2/names/..            key of the newest result of a task name, for explanations only
+//! ROOT/v2/stat/HOST           content hashes of files by their stat, one small file a machine
+//! ROOT/v2/stat/HOST-run-..    stamps of whole runs
+//! ROOT/v2/tmp/..              files being written
 //! ```
 //!
 //! # Invariants
@@ -48,7 +48,9 @@ pub use stat_index::StatIndex;
 use crate::step::Artifact;
 
 /// Folder of the layout above.
-const LAYOUT: &str = "v1";
+const LAYOUT: &str = "v2";
+/// Folders of earlier layouts, which other versions of the program may still use; `clear` removes them.
+const EARLIER: [&str; 1] = ["v1"];
 /// Marks a cache folder, see <https://bford.info/cachedir/>.
 const TAG_FILE: &str = "CACHEDIR.TAG";
 const TAG_TEXT: &str = "Signature: 8a477f597d28d172789f06886806bc55\n# Results cached by meshmill.\n";
@@ -219,6 +221,9 @@ impl Store {
         let tmp = self.folder("tmp");
         let write = || -> io::Result<()> {
             if let Some(parent) = path.parent() {
+                if parent.is_symlink() {
+                    fs::remove_file(parent)?;
+                }
                 fs::create_dir_all(parent)?;
             }
             if fs::symlink_metadata(path).is_ok_and(|meta| meta.is_dir()) {

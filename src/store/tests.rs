@@ -150,6 +150,41 @@ fn no_link_is_followed_for_writing() {
     assert_eq!(fs::read_to_string(&victim).unwrap(), "precious");
 }
 
+#[cfg(unix)]
+#[test]
+fn a_link_in_the_place_of_a_shard_is_neither_cleaned_nor_written_through() {
+    let (_folder, store) = store();
+    let outside = tempfile::tempdir().unwrap();
+    let (key, _) = fill(&store, 1)[0];
+    let shard = store.place("ac", &key).parent().unwrap().to_path_buf();
+    let precious = outside.path().join(key.to_hex().as_str());
+    fs::rename(store.place("ac", &key), &precious).unwrap();
+    fs::remove_dir(&shard).unwrap();
+    std::os::unix::fs::symlink(outside.path(), &shard).unwrap();
+    store.gc(GcLimits { max_bytes: Some(0), ..GcLimits::default() }).unwrap();
+    assert!(precious.exists(), "gc deleted through a link");
+    let before = fs::read(&precious).unwrap();
+    fs::write(&precious, "precious").unwrap();
+    fill(&store, 1);
+    assert_eq!(fs::read(&precious).unwrap(), b"precious");
+    assert_eq!(fs::read(store.place("ac", &key)).unwrap().len(), before.len());
+}
+
+#[test]
+fn clear_takes_earlier_layouts_along_and_gc_what_was_moved_aside() {
+    let (folder, store) = store();
+    fs::create_dir_all(folder.path().join("v1/ac/ab")).unwrap();
+    let aside = store.folder("tmp").join("folder-x");
+    fs::create_dir_all(aside.join("was/inside")).unwrap();
+    store.gc(GcLimits::default()).unwrap();
+    assert!(aside.exists(), "it may be on the way");
+    fs::File::open(&aside).unwrap().set_modified(SystemTime::now() - 2 * Duration::from_hours(1)).unwrap();
+    store.gc(GcLimits::default()).unwrap();
+    assert!(!aside.exists() && folder.path().join("v1").exists());
+    store.clear().unwrap();
+    assert!(!folder.path().join("v1").exists());
+}
+
 #[test]
 fn gc_removes_what_was_not_used_for_long() {
     let (_folder, store) = store();
