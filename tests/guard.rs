@@ -221,6 +221,41 @@ fn a_lock_is_not_replaced_by_what_a_run_writes_nor_a_result_by_a_lock() {
     assert_eq!(desk.text("o/result.obj"), result);
 }
 
+#[test]
+fn a_cache_that_takes_nothing_costs_no_result_and_is_told() {
+    let desk = Desk::new();
+    for shard in 0..256 {
+        for folder in ["ac", "cas"] {
+            desk.write(&format!("cache/v2/{folder}/{shard:02x}"), "in the way");
+        }
+    }
+    let told = predicate::str::contains("warning: the cache could not be written").count(1);
+    desk.run(&["--out", "o"]).success().stderr(told.clone());
+    assert!(desk.text("o/result.obj").starts_with('#') && desk.path("o/deep/result.vtu").exists());
+    // Nothing was kept, so nothing is up to date.
+    desk.run(&["--out", "o"]).success().stderr(told);
+    fs::remove_dir_all(desk.path("cache")).unwrap();
+    let before = desk.text("o/result.obj");
+    desk.run(&["--out", "o"]).success().stderr(predicate::str::contains("warning").not());
+    assert_eq!(desk.text("o/result.obj"), before);
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn leftovers_go_wherever_the_run_writes() {
+    let desk = Desk::new();
+    let host: String = fs::read_to_string("/proc/sys/kernel/hostname").unwrap();
+    let host: String = host.chars().filter(char::is_ascii_alphanumeric).collect();
+    let places = ["o", "o/deep", "o/failed/deep"].map(|folder| format!("{folder}/.meshmill-{host}-4194305-x.tmp"));
+    for place in &places {
+        desk.write(place, "left");
+    }
+    desk.run(&["--out", "o"]).success();
+    for place in &places {
+        assert!(!desk.path(place).exists(), "{place}");
+    }
+}
+
 #[cfg(unix)]
 #[test]
 fn a_pipe_in_the_place_of_an_output_is_replaced() {

@@ -86,34 +86,51 @@ pub(super) fn list_files(folder: &Path, pattern: &str, most: usize) -> Result<Ve
     let mut files = Vec::new();
     for path in found.take(most) {
         let path = path.map_err(|error| format!("cannot read {}", error.path().display()))?;
-        if path.is_symlink() && !path.exists() {
-            return Err(format!("{} fits the pattern and is a link that leads nowhere", path.display()));
-        }
         if path.is_file() {
             files.push(path);
         }
     }
-    unreadable_names(&pattern)?;
+    unusable_names(&pattern)?;
     files.sort();
     Ok(files)
 }
 
-/// Fails where a name that is not UTF-8, which patterns pass over, fits one as far as it can be read.
-fn unreadable_names(pattern: &Path) -> Result<(), String> {
-    let (Some(parent), Some(name)) = (pattern.parent(), pattern.file_name()) else { return Ok(()) };
-    let (parent, name) = (parent.to_string_lossy(), name.to_string_lossy());
-    let Ok(name) = glob::Pattern::new(&name) else { return Ok(()) };
-    let parent = if parent.is_empty() { ".".into() } else { parent };
-    let folders = glob::glob(&parent).map_err(|error| error.msg.to_owned())?;
-    for folder in folders.filter_map(Result::ok) {
-        let Ok(entries) = fs::read_dir(&folder) else { continue };
-        for entry in entries.filter_map(Result::ok) {
-            let file = entry.file_name();
-            if file.to_str().is_none() && name.matches(&file.to_string_lossy()) {
-                let file = folder.join(&file);
-                let message = "fits the pattern, but its name is not UTF-8; rename it";
-                return Err(format!("{} {message}", file.display()));
-            }
+/// Fails where a file or folder fits a part of the pattern, and patterns pass it over: its name is not UTF-8, or it is a
+/// link that leads nowhere.
+fn unusable_names(pattern: &Path) -> Result<(), String> {
+    for whole in pattern.ancestors() {
+        let (Some(parent), Some(name)) = (whole.parent(), whole.file_name()) else { continue };
+        let name = name.to_string_lossy();
+        if !name.contains(['*', '?', '[']) {
+            continue;
+        }
+        // Two stars stand for folders of any depth, so what fits them may lie in any of these.
+        let parent = if name == "**" { whole } else { parent }.to_string_lossy();
+        let parent = if parent.is_empty() { ".".into() } else { parent };
+        let Ok(part) = glob::Pattern::new(&name) else { continue };
+        let folders = glob::glob(&parent).map_err(|error| error.msg.to_owned())?;
+        for folder in folders.filter_map(Result::ok) {
+            unusable_name(&folder, &part, whole == pattern)?;
+        }
+    }
+    Ok(())
+}
+
+/// Fails where something in this folder fits a part of a pattern, its last one or one before, and cannot be used.
+fn unusable_name(folder: &Path, part: &glob::Pattern, is_last: bool) -> Result<(), String> {
+    let Ok(entries) = fs::read_dir(folder) else { return Ok(()) };
+    for entry in entries.filter_map(Result::ok) {
+        let (name, path) = (entry.file_name(), entry.path());
+        if !part.matches(&name.to_string_lossy()) {
+            continue;
+        }
+        // Editors keep hidden links that lead nowhere beside a file, which are no folders of parts.
+        let is_hidden = part.as_str() == "**" || name.as_encoded_bytes().starts_with(b".");
+        if path.is_symlink() && !path.exists() && (is_last || !is_hidden) {
+            return Err(format!("{} fits the pattern and is a link that leads nowhere", path.display()));
+        }
+        if name.to_str().is_none() && (is_last || path.is_dir()) {
+            return Err(format!("{} fits the pattern, but its name is not UTF-8; rename it", path.display()));
         }
     }
     Ok(())

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use super::context::{plan_cases, relative};
 use super::exit::{Exit, Fault, data, say};
-use super::run::write_record;
+use super::run::{tell_unsaved, write_record};
 use super::signals::Interrupt;
 use super::sweep::{Arguments, table_text, write_tables};
 use super::{Global, report};
@@ -78,6 +78,8 @@ struct Hunt<'a> {
     specs: Vec<CaseSpec>,
     merits: Vec<Merit>,
     fault: Option<Fault>,
+    /// Whether it was said that the cache cannot be written.
+    told: bool,
 }
 
 pub(super) fn run(
@@ -104,6 +106,7 @@ pub(super) fn run(
         specs: Vec::new(),
         merits: Vec::new(),
         fault: None,
+        told: false,
     };
     search(&start, arguments.evaluations as usize, &mut |point| hunt.evaluate(point));
     if let Some(fault) = hunt.fault {
@@ -167,6 +170,9 @@ impl Hunt<'_> {
         if outcome.cancelled {
             return None;
         }
+        let told = self.told || outcome.unsaved.is_some();
+        let outcome = if self.told { outcome } else { tell_unsaved(outcome) };
+        self.told = told;
         let names: Vec<String> = self.variables.iter().map(|variable| variable.name.clone()).collect();
         let mut table = SweepTable::new(&self.recipe.name, &names, &plan, &outcome);
         let mut row = table.rows.pop()?;
@@ -271,7 +277,7 @@ impl Hunt<'_> {
     fn report(&self) -> Result<(), Fault> {
         let plan = plan_cases(self.recipe, &self.specs, Some(&self.goal.columns))?;
         let silent: Arc<dyn Observer> = Arc::new(run::Silent);
-        let outcome = run::run(&plan, self.store, self.options, &silent)?;
+        let outcome = tell_unsaved(run::run(&plan, self.store, self.options, &silent)?);
         let mut report = Report::new(&self.recipe.name, &plan, &outcome);
         report::describe(&mut report, self.recipe);
         write_record(&report, &self.options.out)?;

@@ -9,7 +9,7 @@ use super::Global;
 use super::context::{Planned, RecipeArguments, lock_file, open_store};
 use super::exit::{Exit, Fault, say};
 use super::picture::Pictures;
-use super::run::{execute, options, tell};
+use super::run::{Ran, execute, options, tell};
 use super::signals::Interrupt;
 use crate::report::lock::{Class, Lock, ingredients};
 use crate::report::{Report, Status};
@@ -60,7 +60,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Fault>
     options.protected.push(file.clone());
     let _claim = run::claim(&options.out)?;
     let before = ingredients(&planned.recipe.name, &planned.plan, &run::records(&planned.plan, &store, &options));
-    let (report, cancelled) = execute(&planned, &store, &options, global, (None, Pictures::default()))?;
+    let Ran { report, cancelled, .. } = execute(&planned, &store, &options, global, (None, Pictures::default()))?;
     if report.status != Status::Done {
         tell(&report, false, global.quiet)?;
         say("nothing was locked");

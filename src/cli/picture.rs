@@ -50,7 +50,11 @@ pub(super) fn write(plan: &Plan, outcome: &RunOutcome, store: &Store, which: Pic
             continue;
         }
         let artifact = outcome.task(wanted.task).content.and_then(|content| store.load(&content));
-        let Some(mesh) = artifact.and_then(|artifact| artifact.to_soup()) else { continue };
+        let Some(mesh) = artifact.and_then(|artifact| artifact.to_soup()) else {
+            // The cache could not keep it, and the picture that is there shows an earlier mesh.
+            let _ = fs::remove_file(&place);
+            continue;
+        };
         match picture::png(&mesh, SIZE, &format!("meshmill {VERSION}")) {
             Ok(bytes) => run::write_file(&place, &bytes)?,
             Err(error) => tracing::warn!(place = %place.display(), %error, "cannot draw a picture"),

@@ -143,7 +143,8 @@ impl Library for Shelf<'_> {
 impl Shelf<'_> {
     fn remember(&self, key: &blake3::Hash, made: &Measurement) -> Result<(), crate::store::StoreError> {
         let artifact = Artifact::Metrics(std::sync::Arc::new(made.clone()));
-        let saved = self.0.save(&artifact)?;
+        let (saved, written) = self.0.save(&artifact);
+        written?;
         let figures = Figures { port: artifact.port().to_string(), metrics: Some(made.clone()), ..Figures::default() };
         let entry = Entry {
             version: VERSION.to_owned(),

@@ -84,7 +84,7 @@ pub(super) fn once(arguments: &Arguments, global: &Global, interrupt: &Interrupt
     let held = arguments.locked.as_ref().map(|file| Held::new(Path::new(file), &planned, &store, &options));
     let held = held.transpose()?;
     let extras = (arguments.trace.as_deref(), arguments.pictures);
-    let (report, cancelled) = execute(&planned, &store, &options, global, extras)?;
+    let Ran { report, cancelled, saved } = execute(&planned, &store, &options, global, extras)?;
     tell(&report, arguments.json, global.quiet)?;
     if cancelled {
         return Ok(interrupt.exit());
@@ -95,7 +95,7 @@ pub(super) fn once(arguments: &Arguments, global: &Global, interrupt: &Interrupt
     if let Some(held) = held {
         held.check(&report, &options.out)?;
     }
-    if let (Some(unchanged), Status::Done) = (unchanged, report.status) {
+    if let (Some(unchanged), Status::Done, true) = (unchanged, report.status, saved) {
         let out = if global.quiet { String::new() } else { table::report(&report.unchanged()) };
         let said = Said { out, err: Vec::new(), exit: 0 };
         unchanged.remember(&store, (seen, report.written().collect()), said, &report, &options.out)?;
@@ -113,14 +113,23 @@ impl Arguments {
     }
 }
 
-/// Runs the plan and keeps a record of it; also whether it was interrupted.
+/// A run that has ended.
+pub(super) struct Ran {
+    pub(super) report: Report,
+    /// Whether it was interrupted.
+    pub(super) cancelled: bool,
+    /// Whether the cache took all of it.
+    pub(super) saved: bool,
+}
+
+/// Runs the plan and keeps a record of it.
 pub(super) fn execute(
     planned: &Planned,
     store: &Store,
     options: &RunOptions,
     global: &Global,
     (trace, pictures): (Option<&Path>, Pictures),
-) -> Result<(Report, bool), Fault> {
+) -> Result<Ran, Fault> {
     let outcome = traced(trace, global, &|observer| run::run(&planned.plan, store, options, observer))?;
     let mut report = Report::new(&planned.recipe.name, &planned.plan, &outcome);
     report::describe(&mut report, &planned.recipe);
@@ -132,7 +141,7 @@ pub(super) fn execute(
         picture::write(&planned.plan, &outcome, store, pictures)?;
         write_record(&report, &options.out)?;
     }
-    Ok((report, outcome.cancelled))
+    Ok(Ran { report, cancelled: outcome.cancelled, saved: outcome.unsaved.is_none() })
 }
 
 /// Removes what the last run of this folder wrote and this one did not, with its picture, so that nobody takes it for a
@@ -164,12 +173,24 @@ type Work<'a> = dyn Fn(&Arc<dyn Observer>) -> Result<RunOutcome, RunError> + 'a;
 /// Runs something under the observer that suits the terminal, with a timeline where one is asked for.
 pub(super) fn traced(trace: Option<&Path>, global: &Global, work: &Work<'_>) -> Result<RunOutcome, Fault> {
     let observer: Arc<dyn Observer> = progress::observer(global.quiet, global.verbose > 0);
-    let Some(path) = trace else { return Ok(work(&observer)?) };
+    let Some(path) = trace else { return Ok(tell_unsaved(work(&observer)?)) };
     let trace = Arc::new(Trace::new(observer));
     let observer = Arc::clone(&trace) as Arc<dyn Observer>;
     let outcome = work(&observer)?;
     trace.write(path)?;
-    Ok(outcome)
+    Ok(tell_unsaved(outcome))
+}
+
+/// Tells what the cache could not take.
+pub(super) fn tell_unsaved(outcome: RunOutcome) -> RunOutcome {
+    if let Some(reason) = &outcome.unsaved {
+        say(&format!(
+            "warning: the cache could not be written, so the next run computes some of this again, and pictures and \
+             reports may lack meshes: {reason}\n   help: check the folder and its free space, or use another one with \
+             --cache DIR"
+        ));
+    }
+    outcome
 }
 
 /// The options of a run of this recipe.

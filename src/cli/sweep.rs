@@ -111,7 +111,8 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Fault>
     }
     let said = tell(&table, arguments, global.quiet)?;
     // Which files a pattern finds is not known from files.
-    if let Some(unchanged) = unchanged.filter(|_| !found.lists_files && table.count(RowState::Failed) == 0) {
+    let whole = !found.lists_files && outcome.unsaved.is_none() && table.count(RowState::Failed) == 0;
+    if let Some(unchanged) = unchanged.filter(|_| whole) {
         let mut written: Vec<PathBuf> = report.written().collect();
         written.extend(["sweep.csv", "sweep.ron"].map(|name| options.out.join(name)));
         unchanged.remember(&store, (seen, written), said, &report, &options.out)?;

@@ -9,7 +9,7 @@ use super::figures::figures;
 use super::observe::{Event, Observer};
 use super::shared::{NoArtifact, Shared, VERSION, recipe_task};
 use super::{FileState, RunError, gate, output};
-use crate::plan::{ContentHash, GateTask, Key, Record, StepTask, Task, TaskId};
+use crate::plan::{ContentHash, GateTask, Record, StepTask, Task, TaskId};
 use crate::step::{FailureKind, Inputs, StepFailure};
 use crate::store::{Entry, Outcome};
 use crate::watch::{Progress, Watch};
@@ -37,7 +37,7 @@ pub(super) enum Finished {
     Lost(TaskId),
     /// It cannot be done.
     Failed(StepFailure),
-    /// Store or disk failed; the whole run ends.
+    /// The disk failed; the whole run ends.
     Broken(RunError),
 }
 
@@ -98,7 +98,7 @@ fn task(shared: &Shared<'_>, id: TaskId, watch: &Watch) -> Result<Finished, Fini
         Task::Gate(gate) => gate_task(shared, id, gate, watch)?,
     };
     let entry = entry(shared, &node.label, record, outcome, stats, start);
-    publish(shared, &key, &entry)?;
+    shared.publish(&key, &entry);
     Ok(Finished::Task(Box::new(entry)))
 }
 
@@ -120,10 +120,6 @@ fn entry(
     }
 }
 
-fn publish(shared: &Shared<'_>, key: &Key, entry: &Entry) -> Result<(), Finished> {
-    shared.store.publish(key, entry).map_err(Finished::from)
-}
-
 fn step_task(
     shared: &Shared<'_>,
     id: TaskId,
@@ -139,7 +135,7 @@ fn step_task(
     let produced = shared.pool()?.install(work).unwrap_or_else(|payload| Err(panicked(payload.as_ref())));
     let produced = produced.map_err(Finished::Failed)?;
     let figures = figures(&produced.artifact);
-    let saved = shared.store.save(&produced.artifact)?;
+    let saved = shared.save(&produced.artifact);
     if let Some(before) = shared.learn(id, saved.content) {
         return Err(Finished::Failed(changed(before, saved.content)));
     }

@@ -81,6 +81,8 @@ pub struct RunOutcome {
     pub files: Vec<FileOutcome>,
     /// Whether it was interrupted.
     pub cancelled: bool,
+    /// Why the cache could not take all of it: the results are right, and the next run computes some of them again.
+    pub unsaved: Option<String>,
     /// Seconds from start to end.
     pub seconds: f64,
 }

@@ -142,7 +142,7 @@ fn settle(
     if shared.store.entry(key).is_none_or(|known| known.outcome != outcome) {
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         let task = recipe_task(&shared.options.name, &format!("{step} -> {name}"));
-        shared.store.publish(key, &file_entry(task, outcome))?;
+        shared.publish(key, &file_entry(task, outcome));
     }
     let state = if current == Some(content) { FileState::Current } else { FileState::Written };
     Ok(Finished::File(state, content))

@@ -1,6 +1,7 @@
 //! The loop of a run: look at nodes whose inputs are known, start what is ready, take in what is finished.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, mpsc};
 use std::thread;
@@ -27,9 +28,8 @@ pub fn run(
     let start = Instant::now();
     guard::check(plan, options)?;
     let shared = Shared::new(plan, store, options);
-    for case in 0..plan.cases().len() {
-        remove_leftovers(&shared.folder(case));
-        remove_leftovers(&shared.folder(case).join("failed"));
+    for folder in folders(&shared) {
+        remove_leftovers(&folder);
     }
     let mut schedule = Schedule::new(&shared, Arc::clone(observer));
     let (sender, receiver) = mpsc::channel();
@@ -50,6 +50,19 @@ pub fn run(
         let _ = std::fs::remove_dir(shared.folder(case).join("failed"));
     }
     Ok(schedule.into_outcome(start.elapsed().as_secs_f64()))
+}
+
+/// Every folder that the run may write files into.
+fn folders(shared: &Shared<'_>) -> BTreeSet<PathBuf> {
+    let mut folders = BTreeSet::from([shared.options.out.clone()]);
+    for (number, case) in shared.plan.cases().iter().enumerate() {
+        let own = shared.folder(number);
+        folders.extend([own.clone(), own.join("failed")]);
+        let files =
+            case.outputs.iter().flat_map(|output| [own.join(&output.file), own.join("failed").join(&output.file)]);
+        folders.extend(files.filter_map(|file| file.parent().map(Path::to_path_buf)));
+    }
+    folders
 }
 
 struct Schedule<'a> {
@@ -383,6 +396,7 @@ impl<'a> Schedule<'a> {
             tasks: self.tasks,
             files,
             cancelled: self.shared.options.cancelled.load(Ordering::Relaxed),
+            unsaved: self.shared.unsaved().map(ToString::to_string),
             seconds,
         }
     }

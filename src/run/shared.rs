@@ -7,7 +7,7 @@ use super::{RunError, RunOptions};
 use crate::metric::gate::GateReport;
 use crate::plan::{ContentHash, Key, Plan, Record, Task, TaskId, task_key, task_record};
 use crate::step::{Artifact, FileBytes, StepFailure};
-use crate::store::{CODEC_VERSION, StatIndex, Store};
+use crate::store::{CODEC_VERSION, Entry, Saved, StatIndex, Store, StoreError};
 
 /// The version that entries and output files carry.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
@@ -26,6 +26,7 @@ pub(super) struct Shared<'a> {
     slots: Vec<Mutex<Option<Artifact>>>,
     reports: Vec<OnceLock<GateReport>>,
     pool: OnceLock<Arc<rayon::ThreadPool>>,
+    unsaved: OnceLock<StoreError>,
 }
 
 /// Why an artifact cannot be had.
@@ -47,7 +48,32 @@ impl<'a> Shared<'a> {
             slots: (0..plan.len()).map(|_| Mutex::new(None)).collect(),
             reports: (0..plan.len()).map(|_| OnceLock::new()).collect(),
             pool: OnceLock::new(),
+            unsaved: OnceLock::new(),
         }
+    }
+
+    /// Saves an artifact. A cache that cannot be written costs the next run time, and this one nothing; it is told at the
+    /// end.
+    pub(super) fn save(&self, artifact: &Artifact) -> Saved {
+        let (saved, written) = self.store.save(artifact);
+        self.note_unsaved(written);
+        saved
+    }
+
+    /// Publishes what a task gave, as far as the cache can be written.
+    pub(super) fn publish(&self, key: &Key, entry: &Entry) {
+        self.note_unsaved(self.store.publish(key, entry));
+    }
+
+    fn note_unsaved(&self, written: Result<(), StoreError>) {
+        if let Err(error) = written {
+            self.unsaved.get_or_init(|| error);
+        }
+    }
+
+    /// What the cache could not take first.
+    pub(super) fn unsaved(&self) -> Option<&StoreError> {
+        self.unsaved.get()
     }
 
     /// The content of what a task gives, once that is known.

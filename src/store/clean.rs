@@ -113,7 +113,8 @@ impl Store {
         Ok(report)
     }
 
-    /// Checks every entry and blob, and removes what is damaged.
+    /// Checks every file, and removes what is damaged: entries, blobs, names, the index and stamps of this machine, and
+    /// whatever lies in the place of one and is no file, which is moved aside.
     pub fn verify(&self) -> Result<CleanReport, StoreError> {
         let mut report = CleanReport::default();
         for entry in self.items("ac")? {
@@ -128,7 +129,50 @@ impl Store {
                 report.damaged.push(blob.path);
             }
         }
+        for name in self.items("names")? {
+            if fs::read(&name.path).is_ok_and(|bytes| seal::open(name.hash.as_bytes(), &bytes).is_err()) {
+                report.discard(name.path);
+            }
+        }
+        for (path, _) in files(&self.folder("stat"))? {
+            // Beside a stamp lies the record that the next run puts in place, plain text.
+            let name = path.file_name().unwrap_or_default();
+            let is_sealed = path.extension().is_none_or(|ending| ending != "ron");
+            let opens = |bytes: Vec<u8>| seal::open(name.as_encoded_bytes(), &bytes).is_ok();
+            if is_sealed && fs::read(&path).is_ok_and(|bytes| !opens(bytes)) {
+                report.discard(path);
+            }
+        }
+        for path in self.intruders()? {
+            // A link or pipe goes; what a folder holds may be somebody's.
+            if fs::symlink_metadata(&path).is_ok_and(|meta| meta.is_dir()) {
+                self.move_aside(&path).map_err(StoreError::io("move aside", &path))?;
+            }
+            report.discard(path);
+        }
         Ok(report)
+    }
+
+    /// What is no plain file in the place of a file, or no folder in the place of a shard.
+    fn intruders(&self) -> Result<Vec<PathBuf>, StoreError> {
+        let mut found = Vec::new();
+        for folder in ["ac", "cas", "names"] {
+            let root = self.folder(folder);
+            let shards = fs::read_dir(&root).map_err(StoreError::io("read", &root))?;
+            for shard in shards.filter_map(Result::ok) {
+                if shard.file_type().is_ok_and(|kind| !kind.is_dir()) {
+                    found.push(shard.path());
+                    continue;
+                }
+                let items = fs::read_dir(shard.path()).into_iter().flatten().filter_map(Result::ok);
+                found.extend(items.filter(|item| item.file_type().is_ok_and(|kind| !kind.is_file())).map(|i| i.path()));
+            }
+        }
+        let root = self.folder("stat");
+        let stamps = fs::read_dir(&root).map_err(StoreError::io("read", &root))?.filter_map(Result::ok);
+        found.extend(stamps.filter(|item| item.file_type().is_ok_and(|kind| !kind.is_file())).map(|item| item.path()));
+        found.sort();
+        Ok(found)
     }
 
     /// Removes everything. Refuses a folder that does not say that it is a cache.
@@ -189,6 +233,12 @@ enum Removed {
 }
 
 impl CleanReport {
+    /// Removes what is damaged and counts as nothing else. What is gone already, or aside, is named all the same.
+    fn discard(&mut self, path: PathBuf) {
+        let _ = fs::remove_file(&path);
+        self.damaged.push(path);
+    }
+
     /// Removes a file and counts it; returns the bytes freed. A file that is gone already frees nothing.
     fn remove(&mut self, item: &Item, dry_run: bool, what: Removed) -> u64 {
         if !dry_run && fs::remove_file(&item.path).is_err() {

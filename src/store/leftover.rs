@@ -2,7 +2,8 @@
 //! nothing else.
 //!
 //! The name tells machine and process. A file of this machine goes when its process is gone, one of another machine
-//! when it is a day old. Where the system does not tell which processes live, age alone decides.
+//! when it is a day old. Where the system does not tell which processes live, age alone decides. A process that writes
+//! into a shared folder for longer than a day from another machine finds its file gone, and fails.
 
 use std::fs;
 use std::io::{self, Write};
@@ -47,10 +48,10 @@ fn is_dead(rest: &str, entry: &fs::DirEntry) -> bool {
     let age = entry.metadata().and_then(|meta| meta.modified()).ok();
     let stale = age.and_then(|time| SystemTime::now().duration_since(time).ok()).is_some_and(|age| age > STALE);
     let process = rest.strip_prefix(&format!("{}-", host())).and_then(|rest| rest.split('-').next());
-    let gone = process.is_some_and(|process| {
-        process.parse::<u32>().is_ok() && Path::new("/proc/self").exists() && !Path::new("/proc").join(process).exists()
-    });
-    stale || gone
+    match process.filter(|process| process.parse::<u32>().is_ok() && Path::new("/proc/self").exists()) {
+        Some(process) => !Path::new("/proc").join(process).exists(),
+        None => stale,
+    }
 }
 
 fn host() -> String {
@@ -69,10 +70,17 @@ mod tests {
         let name = |process: u32| folder.path().join(format!("{PREFIX}{}-{process}-abc{SUFFIX}", host()));
         // Process numbers end at 2^22 on Linux.
         let (dead, alive) = (name(4_194_305), name(std::process::id()));
-        for path in [&dead, &alive, &folder.path().join("part.tmp")] {
+        let elsewhere = |time: &str| folder.path().join(format!("{PREFIX}elsewhere-1-{time}{SUFFIX}"));
+        let (old, new) = (elsewhere("old"), elsewhere("new"));
+        for path in [&dead, &alive, &old, &new, &folder.path().join("part.tmp")] {
             fs::write(path, "x").unwrap();
         }
+        for path in [&alive, &old] {
+            let time = SystemTime::now() - 2 * STALE;
+            fs::File::options().append(true).open(path).unwrap().set_modified(time).unwrap();
+        }
         remove_leftovers(folder.path());
+        assert!(!old.exists() && new.exists());
         assert!(!dead.exists() && alive.exists() && folder.path().join("part.tmp").exists());
     }
 }

@@ -176,16 +176,21 @@ impl Store {
     }
 
     /// Saves an artifact under its content hash. Content that is there already is not written again.
-    pub fn save(&self, artifact: &Artifact) -> Result<Saved, StoreError> {
+    ///
+    /// What it is called is known although it could not be written: the work that made it is not lost with the disk.
+    pub fn save(&self, artifact: &Artifact) -> (Saved, Result<(), StoreError>) {
         let canonical = codec::encode(artifact);
         let content = codec::content_hash(&canonical);
-        let path = self.place("cas", &content);
+        (Saved { content, bytes: canonical.len() as u64 }, self.write_blob(&content, &canonical))
+    }
+
+    fn write_blob(&self, content: &Hash, canonical: &[u8]) -> Result<(), StoreError> {
+        let path = self.place("cas", content);
         if seal::is_plain(&path) {
             refresh(&path);
-        } else {
-            self.write_whole(&path, &pack::pack(&canonical)?)?;
+            return Ok(());
         }
-        Ok(Saved { content, bytes: canonical.len() as u64 })
+        self.write_whole(&path, &pack::pack(canonical)?)
     }
 
     /// The artifact of this content. A missing or damaged blob is a miss; a damaged one is said so and removed.

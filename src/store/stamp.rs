@@ -80,7 +80,7 @@ impl Store {
     /// record of a run that did nothing.
     pub fn unchanged(&self, identity: &Hash) -> Option<Said> {
         let bytes = seal::read(&self.stamp_file(identity)).ok()?;
-        let stamp: Stamp = serde_json::from_slice(seal::open(identity.as_bytes(), &bytes).ok()?).ok()?;
+        let stamp: Stamp = serde_json::from_slice(seal::open(stamp_name(identity).as_bytes(), &bytes).ok()?).ok()?;
         let same = |(path, known): &(PathBuf, Stat)| fs::metadata(path).is_ok_and(|meta| stat(&meta) == *known);
         if !stamp.files.iter().all(same) {
             return None;
@@ -113,7 +113,7 @@ impl Store {
         let Some(read) = read else { return };
         files.extend(read);
         if let Ok(bytes) = serde_json::to_vec(&Stamp { files, said, record })
-            && let Err(error) = self.write_whole(&path, &seal::seal(identity.as_bytes(), &bytes))
+            && let Err(error) = self.write_whole(&path, &seal::seal(stamp_name(identity).as_bytes(), &bytes))
         {
             tracing::warn!(%error, "the stamp of the run was not saved");
         }
@@ -121,7 +121,7 @@ impl Store {
     }
 
     fn stamp_file(&self, identity: &Hash) -> PathBuf {
-        self.folder("stat").join(format!("{}{}", prefix(), &identity.to_hex()[..32]))
+        self.folder("stat").join(stamp_name(identity))
     }
 
     fn forget_old_stamps(&self) {
@@ -136,6 +136,11 @@ impl Store {
             stamps.iter().take(stamps.len() - MOST).for_each(|(_, path)| drop(fs::remove_file(path)));
         }
     }
+}
+
+/// The name of a stamp's file, for which it is sealed.
+fn stamp_name(identity: &Hash) -> String {
+    format!("{}{}", prefix(), &identity.to_hex()[..32])
 }
 
 fn prefix() -> String {

@@ -28,7 +28,8 @@ fn store() -> (tempfile::TempDir, Store) {
 
 fn fill(store: &Store, count: u8) -> Vec<(Hash, Saved)> {
     let one = |i: u8| {
-        let saved = store.save(&artifact(&[i; 100])).unwrap();
+        let (saved, written) = store.save(&artifact(&[i; 100]));
+        written.unwrap();
         let key = blake3::hash(&[i]);
         store.publish(&key, &entry(saved)).unwrap();
         (key, saved)
@@ -62,7 +63,7 @@ fn a_damaged_blob_is_a_miss_and_can_be_saved_again() {
     bytes[last] ^= 1;
     fs::write(&path, bytes).unwrap();
     assert!(store.load(&saved.content).is_none());
-    store.save(&artifact(&[0; 100])).unwrap();
+    store.save(&artifact(&[0; 100])).1.unwrap();
     assert!(store.load(&saved.content).is_some());
 }
 
@@ -94,7 +95,7 @@ fn exchanged_entries_serve_nobody_and_verify_names_them() {
 fn a_name_or_an_index_of_something_else_is_not_believed() {
     let (_folder, store) = store();
     fill(&store, 1);
-    let mut other = entry(store.save(&artifact(b"other")).unwrap());
+    let mut other = entry(store.save(&artifact(b"other")).0);
     other.task = "other/fe".into();
     store.publish(&blake3::hash(b"other"), &other).unwrap();
     let place = |task: &str| store.place("names", &name_hash(task));
@@ -219,7 +220,7 @@ fn gc_by_size_keeps_a_blob_that_a_younger_entry_names() {
 #[test]
 fn gc_leaves_a_young_blob_without_entry_alone() {
     let (_folder, store) = store();
-    let saved = store.save(&artifact(b"on the way")).unwrap();
+    let (saved, _) = store.save(&artifact(b"on the way"));
     store.gc(GcLimits::default()).unwrap();
     assert!(store.load(&saved.content).is_some());
     age(&store.place("cas", &saved.content), 2 * 60 * 60);
@@ -234,6 +235,74 @@ fn verify_names_and_removes_what_is_damaged() {
     fs::write(&path, b"nonsense").unwrap();
     assert_eq!(store.verify().unwrap().damaged, [path]);
     assert_eq!(store.verify().unwrap(), CleanReport::default());
+}
+
+#[cfg(unix)]
+#[test]
+fn verify_looks_at_every_file_and_at_what_is_none() {
+    let (folder, store) = store();
+    let items = fill(&store, 3);
+    let name = store.place("names", &name_hash("part/fe"));
+    let file = folder.path().join("part.stl");
+    fs::write(&file, b"one").unwrap();
+    let identity = stamp::identity(&[b"run"]);
+    let said = stamp::Said::default();
+    store.stamp(&identity, (vec![stamp::Seen::of(&file, None)], Vec::new()), said, Some((file, "next".to_owned())));
+    let stats: Vec<_> = fs::read_dir(store.folder("stat")).unwrap().map(|entry| entry.unwrap().path()).collect();
+    let stamp = stats.iter().find(|path| path.extension().is_none()).unwrap();
+    let index = store.folder("stat").join("elsewhere");
+    fs::write(&index, seal::seal(b"elsewhere", b"{}")).unwrap();
+    assert_eq!(store.verify().unwrap(), CleanReport::default(), "all of it is sound");
+    fs::write(&name, "nonsense").unwrap();
+    fs::write(stamp, "nonsense").unwrap();
+    fs::write(&index, seal::seal(b"another", b"{}")).unwrap();
+    let (link, place) = (store.place("ac", &items[1].0), store.place("cas", &items[2].1.content));
+    fs::remove_file(&link).unwrap();
+    std::os::unix::fs::symlink(&place, &link).unwrap();
+    fs::remove_file(&place).unwrap();
+    fs::create_dir_all(place.join("inside")).unwrap();
+    let mut damaged = vec![name, stamp.clone(), index, link, place];
+    let mut found = store.verify().unwrap().damaged;
+    damaged.sort();
+    found.sort();
+    assert_eq!(found, damaged);
+    assert!(damaged.iter().all(|path| fs::symlink_metadata(path).is_err()));
+    assert_eq!(store.verify().unwrap(), CleanReport::default());
+}
+
+#[test]
+fn a_file_that_may_change_within_a_tick_is_not_remembered() {
+    let (folder, store) = store();
+    let file = folder.path().join("part.stl");
+    let remembered = || {
+        let index = StatIndex::open(&store);
+        index.hash(&file).unwrap();
+        index.flush(&store);
+        fs::read_dir(store.folder("stat")).unwrap().count() > 0
+    };
+    // Modified long ago by its own account, and changed just now. A busy machine may need some tries to be fast enough.
+    let old = |time: SystemTime| fs::File::options().append(true).open(&file).unwrap().set_modified(time).unwrap();
+    let fast = (0..1000).any(|_| {
+        fs::write(&file, b"one").unwrap();
+        let start = std::time::Instant::now();
+        old(SystemTime::now() - Duration::from_hours(1));
+        let remembered = remembered();
+        let fast = start.elapsed() < Duration::from_millis(10);
+        assert!(!fast || !remembered, "a file of this very tick was trusted");
+        if remembered {
+            for entry in fs::read_dir(store.folder("stat")).unwrap() {
+                fs::remove_file(entry.unwrap().path()).unwrap();
+            }
+        }
+        fast
+    });
+    assert!(fast || cfg!(not(unix)));
+    // A clock of whole seconds may still give the same time.
+    fs::write(&file, b"two").unwrap();
+    std::thread::sleep(Duration::from_millis(40));
+    let modified = fs::metadata(&file).unwrap().modified().unwrap();
+    let remembered = remembered();
+    assert!(!remembered || modified.elapsed().unwrap() > Duration::from_secs(2), "modified less than two seconds ago");
 }
 
 #[test]

@@ -136,7 +136,7 @@ impl<'a> Reader<'a> {
         let axes = self.section("axes").map(|table| self.axes(table)).unwrap_or_default();
         let mut varied: Vec<String> = axes.iter().map(|axis| axis.name.clone()).collect();
         let dimensions = self.zipped(axes);
-        let mut names = Names::default();
+        let mut names = Names::new(recipe.path.parent().unwrap_or(Path::new("")));
         let mut cases = match self.section("sample") {
             Some(table) => self.sampled(table, &dimensions)?,
             None => self.grid(&dimensions, &mut names)?,
@@ -226,7 +226,7 @@ impl<'a> Reader<'a> {
     }
 
     /// Every combination, the last axis fastest.
-    fn grid(&mut self, dimensions: &[Dimension], names: &mut Names) -> Option<Vec<CaseSpec>> {
+    fn grid(&mut self, dimensions: &[Dimension], names: &mut Names<'_>) -> Option<Vec<CaseSpec>> {
         if dimensions.is_empty() {
             return Some(Vec::new());
         }
@@ -307,7 +307,7 @@ impl<'a> Reader<'a> {
     }
 
     /// The `[[sweep.case]]` tables.
-    fn explicit(&mut self, names: &mut Names) -> Vec<CaseSpec> {
+    fn explicit(&mut self, names: &mut Names<'_>) -> Vec<CaseSpec> {
         let Some(entry) = self.recipe.sweep.get("case") else { return Vec::new() };
         let Node::List(items) = &entry.value.value else {
             let message = format!("cases are written as [[sweep.case]], got {}", entry.value.value.kind());
@@ -321,7 +321,7 @@ impl<'a> Reader<'a> {
         items.iter().filter_map(|item| self.case(item, names)).collect()
     }
 
-    fn case(&mut self, item: &Tree, names: &mut Names) -> Option<CaseSpec> {
+    fn case(&mut self, item: &Tree, names: &mut Names<'_>) -> Option<CaseSpec> {
         let Node::Table(table) = &item.value else {
             let message = format!("a case is a table of parameters, got {}", item.value.kind());
             self.problem(Diagnostic::error(item.span, message));

@@ -74,7 +74,7 @@ fn the_command_line_replaces_and_adds_axes() {
 fn globs_are_relative_to_the_recipe() {
     let sweep = read("[sweep.axes]\ninputs.part = { glob = \"parts/*.stl\" }").unwrap();
     assert_eq!(cases(&sweep), ["inputs.part=lab/parts/a.stl", "inputs.part=lab/parts/b.stl"]);
-    assert_eq!(sweep.cases[1].name, "part-b");
+    assert_eq!(sweep.cases[1].name, "part-parts+b.stl");
 }
 
 #[test]
@@ -101,6 +101,26 @@ fn cases_of_their_own_follow_the_grid() {
     assert_eq!(sweep.varied, ["times", "size", "inputs.part"]);
     let names: Vec<&str> = sweep.cases.iter().map(|case| case.name.as_str()).collect();
     assert_eq!(names, ["times-1", "times-2", "coarse", "times-1_2"]);
+}
+
+#[test]
+fn a_case_keeps_its_name_whatever_else_is_in_the_sweep() {
+    let names = |files: &str| -> Vec<String> {
+        let sweep = read_with("", &[("inputs.part", files)]).unwrap();
+        sweep.cases.iter().map(|case| case.name.clone()).collect()
+    };
+    let all = names("lab/x/part.stl,lab/y/part.stl,lab/a b.stl,lab/ab.stl,lab/a+b.stl");
+    assert_eq!(all[..2], ["part-x+part.stl", "part-y+part.stl"]);
+    assert_eq!(all[3], "part-ab.stl");
+    let different: std::collections::BTreeSet<&String> = all.iter().collect();
+    assert_eq!(different.len(), all.len());
+    for (file, name) in ["x/part.stl", "y/part.stl", "a b.stl", "ab.stl", "a+b.stl"].iter().zip(&all) {
+        assert_eq!(&names(&format!("lab/{file}"))[0], name);
+    }
+    let elsewhere = ["/far/part.stl", "/off/part.stl"].map(|file| names(file)[0].clone());
+    assert!(elsewhere[0].starts_with("part-part.stl-") && elsewhere[0] != elsewhere[1], "{elsewhere:?}");
+    let long = |end: &str| names(&format!("{}{end}.stl", "l".repeat(200)))[0].clone();
+    assert!(long("x").len() <= 100 && long("x") != long("y"), "{} {}", long("x"), long("y"));
 }
 
 #[test]
