@@ -4,6 +4,7 @@
 //! expression, a string that begins with `=`. A step table without `use` is taken as it is: it changes a step of an
 //! extended recipe, and which one only the loader knows.
 
+mod nested;
 mod reference;
 mod sweep;
 
@@ -13,7 +14,8 @@ use schemars::SchemaGenerator;
 use schemars::generate::SchemaSettings;
 use serde_json::{Map, Value, json};
 
-pub use reference::steps_reference;
+pub use nested::{NestedKey, NestedTable, nested_tables};
+pub use reference::{kind, steps_reference};
 
 use crate::metric::registry::{METRICS, MetricDef, Unit};
 use crate::step::{InputDef, Locks, Port, StepDef};
@@ -53,6 +55,10 @@ pub fn recipe_schema(catalog: &[StepDef], endings: &[&str]) -> Value {
             "extends": {
                 "type": "string",
                 "description": "A recipe that this one changes: tables merge, arrays and other values replace."
+            },
+            "drop": {
+                "description": "Entries of the extended recipe that this one takes away, such as \"gates.fe.closed\".",
+                "anyOf": [{ "type": "string" }, { "type": "array", "items": { "type": "string" } }]
             },
             "inputs": {
                 "type": "object",

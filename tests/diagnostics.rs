@@ -24,7 +24,8 @@ fn check(path: &Path, overrides: &Overrides) -> Result<(), Diagnostics> {
         .copied()
         .chain(METRIC_ENDINGS)
         .collect();
-    let context = Context { catalog: CATALOG, check_file: &exists, endings: &endings };
+    let second_order = &["inp", "msh", "vtu"];
+    let context = Context { catalog: CATALOG, check_file: &exists, endings: &endings, second_order };
     plan(&recipe, &context).map(drop)
 }
 
@@ -74,5 +75,13 @@ fn the_command_line_is_explained_too() {
     };
     insta::with_settings!({ snapshot_path => "snapshots/diagnostics", prepend_module_to_snapshot => false, omit_expression => true }, {
         insta::assert_snapshot!("command-line", report("tests/recipes/good.toml", &overrides));
+    });
+}
+
+#[test]
+fn a_wrong_argument_is_underlined_in_the_argument() {
+    let overrides = Overrides { set: vec![("size".to_owned(), "3mm".to_owned())], ..Overrides::default() };
+    insta::with_settings!({ snapshot_path => "snapshots/diagnostics", prepend_module_to_snapshot => false, omit_expression => true }, {
+        insta::assert_snapshot!("wrong-argument", report("tests/recipes/good.toml", &overrides));
     });
 }

@@ -8,7 +8,8 @@ use std::path::{Path, PathBuf};
 
 use meshmill::format::Format;
 use meshmill::plan::{CHECK_KEYS, ELEMENTS, METRIC_ENDINGS, OUTPUT_KEYS};
-use meshmill::schema::{recipe_schema, recipe_schema_text, steps_reference};
+use meshmill::schema::{nested_tables, recipe_schema, recipe_schema_text, steps_reference};
+use meshmill::step::parameters::ParameterSchema;
 use meshmill::steps::CATALOG;
 use serde_json::Value;
 
@@ -89,4 +90,26 @@ fn schema_and_planner_know_the_same_keys() {
     assert_eq!(keys("/definitions/Output/anyOf/1/properties"), set(&OUTPUT_KEYS));
     let elements = schema.pointer("/definitions/Output/anyOf/1/properties/element/anyOf/0/enum").unwrap();
     assert_eq!(elements, &serde_json::json!(ELEMENTS));
+}
+
+#[test]
+fn every_nested_table_has_an_example_that_the_step_reads() {
+    let mut seen = 0;
+    for def in CATALOG {
+        let parameters = ParameterSchema::of(def);
+        for name in parameters.properties.keys() {
+            for table in nested_tables(name, &parameters) {
+                seen += 1;
+                let recipe: Result<toml::Table, _> = toml::from_str(&table.example);
+                assert!(recipe.is_ok_and(|recipe| recipe.contains_key(name)), "{}: {name}", def.name);
+                let text = format!("{{ {} }}", table.example);
+                let value = toml::de::ValueDeserializer::parse(&text).unwrap();
+                // Other parameters may be missing; this one must be right.
+                if let Err(error) = (def.bind)(value) {
+                    assert!(error.message().starts_with("missing field"), "{}: {name}: {error}", def.name);
+                }
+            }
+        }
+    }
+    assert!(seen > 12, "{seen}");
 }

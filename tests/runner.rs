@@ -196,7 +196,8 @@ fn plan_of(folder: &Path, text: &str, set: &[(&str, &str)]) -> Plan {
     let load = |_: &Path| Ok(text.to_owned());
     let set = set.iter().map(|(name, value)| ((*name).to_owned(), (*value).to_owned())).collect();
     let recipe = Recipe::load(&folder.join("toy.toml"), &load, &Overrides { set, ..Overrides::default() });
-    let context = Context { catalog: TOYS, check_file: &|_| Ok(()), endings: &["obj", "stl", "vtu"] };
+    let endings = &["obj", "stl", "vtu"];
+    let context = Context { catalog: TOYS, check_file: &|_| Ok(()), endings, second_order: &["vtu"] };
     plan::plan(&recipe.unwrap_or_else(|problems| panic!("{problems}")), &context)
         .unwrap_or_else(|problems| panic!("{problems}"))
 }

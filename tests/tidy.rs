@@ -17,7 +17,7 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("plan", &["recipe", "step", "mesh", "metric"]),
     ("store", &["step", "mesh", "metric"]),
     ("schema", &["step", "metric"]),
-    ("run", &["plan", "store", "step", "metric", "format", "mesh"]),
+    ("run", &["plan", "store", "step", "metric", "format", "mesh", "recipe"]),
     ("report", &["run", "step", "metric", "mesh", "technique"]),
     (
         "cli",

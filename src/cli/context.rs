@@ -12,6 +12,7 @@ use crate::format::Format;
 use crate::plan::{self, CaseSpec, ColumnRequest, Context, Plan};
 use crate::recipe::{Overrides, Recipe, suggest};
 use crate::run::{self, RunError};
+use crate::step::failure::without_code;
 use crate::steps::CATALOG;
 use crate::store::Store;
 use crate::store::stamp::Seen;
@@ -43,6 +44,16 @@ impl RecipeArguments {
         Ok(Planned { recipe, plan })
     }
 
+    /// Fails where a mesh was given in the place of a recipe.
+    fn check_is_recipe(&self) -> Result<(), Fault> {
+        let Some(format) = Format::from_file_name(&self.recipe.to_string_lossy()) else { return Ok(()) };
+        let (file, title) = (self.recipe.display(), format.title());
+        Err(Fault::usage(format!("{file}: this is a mesh ({title}), and a recipe is a TOML file")).help(format!(
+            "`meshmill init {file}` writes a recipe for it, and `meshmill run pipelines/fe-surface.toml --input \
+             part={file}` runs one that is there"
+        )))
+    }
+
     /// The file of the recipe.
     pub(super) fn path(&self) -> &Path {
         &self.recipe
@@ -62,9 +73,18 @@ impl RecipeArguments {
             inputs: self.input.iter().map(|(name, file)| (name.clone(), PathBuf::from(file))).collect(),
             axes: axes.to_vec(),
         };
-        let load = |path: &Path| fs::read_to_string(path).map_err(|error| error.to_string());
-        Ok(Recipe::load(&self.recipe, &load, &overrides)?)
+        self.check_is_recipe()?;
+        Ok(Recipe::load(&self.recipe, &read_text, &overrides)?)
     }
+}
+
+/// The text of a recipe, or why it cannot be read.
+pub(super) fn read_text(path: &Path) -> Result<String, String> {
+    fs::read_to_string(path).map_err(|error| match error.kind() {
+        std::io::ErrorKind::NotFound => "there is no such file".to_owned(),
+        std::io::ErrorKind::InvalidData => "it is no text; a recipe is a TOML file".to_owned(),
+        _ => without_code(&error.to_string()),
+    })
 }
 
 /// Plans cases of a recipe over the steps that there are.
@@ -73,7 +93,8 @@ pub(super) fn plan_cases(
     cases: &[CaseSpec],
     columns: Option<&[ColumnRequest]>,
 ) -> Result<Plan, Fault> {
-    let context = Context { catalog: CATALOG, check_file: &check_file, endings: &endings() };
+    let (endings, second_order) = (endings(), second_order());
+    let context = Context { catalog: CATALOG, check_file: &check_file, endings: &endings, second_order: &second_order };
     Ok(plan::plan_cases(recipe, cases, columns, &context)?)
 }
 
@@ -222,12 +243,18 @@ pub(super) fn endings() -> Vec<&'static str> {
     Format::ALL.iter().flat_map(|format| format.endings()).copied().collect()
 }
 
+/// The endings of files that hold elements with mid-side nodes.
+fn second_order() -> Vec<&'static str> {
+    let formats = Format::ALL.iter().filter(|format| format.holds_second_order());
+    formats.flat_map(|format| format.endings()).copied().collect()
+}
+
 fn check_file(path: &Path) -> Result<(), String> {
     match fs::metadata(path) {
         Ok(meta) if meta.is_file() => Ok(()),
         Ok(_) => Err("it is not a file".to_owned()),
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => Err("there is no such file".to_owned()),
-        Err(error) => Err(error.to_string()),
+        Err(error) => Err(without_code(&error.to_string())),
     }
 }
 

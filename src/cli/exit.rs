@@ -8,6 +8,7 @@ use crate::recipe::Diagnostics;
 use crate::report::Status;
 use crate::run::RunError;
 use crate::step::StepFailure;
+use crate::step::failure::without_code;
 use crate::store::StoreError;
 
 /// The exit codes of the command.
@@ -71,7 +72,7 @@ pub(super) struct Fault {
 
 impl Fault {
     pub(super) fn new(exit: Exit, message: impl Into<String>) -> Self {
-        Self { exit, message: message.into(), help: None, rendered: false }
+        Self { exit, message: without_code(&message.into()), help: None, rendered: false }
     }
 
     /// The arguments are wrong.
@@ -147,7 +148,7 @@ pub(super) fn data(text: &str) {
     if let Err(error) = writeln!(out, "{text}").and_then(|()| out.flush())
         && error.kind() != ErrorKind::BrokenPipe
     {
-        let _ = UNWRITTEN.set(error.to_string());
+        let _ = UNWRITTEN.set(without_code(&error.to_string()));
     }
 }
 
@@ -155,6 +156,12 @@ pub(super) fn data(text: &str) {
 pub(super) fn unwritten() -> Option<Fault> {
     let error = UNWRITTEN.get()?;
     Some(Fault::new(Exit::Store, format!("cannot write to the standard output: {error}")).help("check its free space"))
+}
+
+/// A text with its failures in red; the stream strips colours where the terminal takes none.
+pub(super) fn coloured(text: &str) -> String {
+    let red = anstyle::AnsiColor::Red.on_default().bold();
+    text.replace("FAILED", &format!("{red}FAILED{red:#}"))
 }
 
 fn say_error(message: &str, help: Option<&str>) {

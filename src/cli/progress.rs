@@ -7,12 +7,12 @@ use std::time::{Duration, Instant};
 
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-use super::exit::say;
+use super::exit::{coloured, say};
 use crate::report::table::figures_text;
 use crate::run::{Event, Observer, Silent, TaskState};
 use crate::store::{Entry, Outcome};
 
-/// Off a terminal, a running task says where it is this often.
+/// With `-v` off a terminal, a running task says where it is this often.
 const INTERVAL: Duration = Duration::from_secs(5);
 
 /// The observer that suits this terminal; none with `quiet`.
@@ -79,8 +79,9 @@ impl Observer for Bars {
                     self.all.remove(&bar);
                 }
                 if let Some(line) = end_line(label, state, entry, self.verbose) {
+                    let plain = anstream::stderr().current_choice() == anstream::ColorChoice::Never;
                     // A terminal that went away is no reason to stop.
-                    let _ = self.all.println(line);
+                    let _ = self.all.println(if plain { line } else { coloured(&line) });
                 }
             }
             Event::Phase { node, name, total } => {
@@ -119,7 +120,7 @@ struct Line {
     said: Instant,
 }
 
-/// A line for the end of each task, and now and then one for a task that takes long.
+/// A line for the end of each task, and with `-v` now and then one for a task that takes long.
 struct Lines {
     running: Mutex<BTreeMap<usize, Line>>,
     verbose: bool,
@@ -136,7 +137,7 @@ impl Observer for Lines {
             Event::State { node, label, state, entry } => {
                 running.remove(&node);
                 if let Some(line) = end_line(label, state, entry, self.verbose) {
-                    say(&line);
+                    say(&coloured(&line));
                 }
             }
             Event::Phase { node, name, total } => {
@@ -146,7 +147,8 @@ impl Observer for Lines {
                 }
             }
             Event::Advance { node, done, figure } => {
-                if let Some(line) = running.get_mut(&node)
+                if self.verbose
+                    && let Some(line) = running.get_mut(&node)
                     && line.said.elapsed() >= INTERVAL
                 {
                     line.said = Instant::now();

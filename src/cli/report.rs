@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::Global;
-use super::context::{open_store, texts};
+use super::context::{open_store, read_text, texts};
 use super::exit::{Exit, Fault, say};
 use crate::metric::Measurement;
 use crate::recipe::{Overrides, Recipe};
@@ -74,8 +74,7 @@ fn folder(target: &Path) -> Result<PathBuf, Fault> {
     if target.is_dir() {
         return Ok(target.to_path_buf());
     }
-    let load = |path: &Path| fs::read_to_string(path).map_err(|error| error.to_string());
-    let recipe = Recipe::load(target, &load, &Overrides::default())?;
+    let recipe = Recipe::load(target, &read_text, &Overrides::default())?;
     let run = Path::new("out").join(&recipe.name);
     let sweep = Path::new("out").join(format!("{}-sweep", recipe.name));
     Ok(if !run.join("run.ron").exists() && sweep.join("run.ron").exists() { sweep } else { run })

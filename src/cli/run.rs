@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use super::Global;
 use super::context::{Planned, RecipeArguments, open_store, protected};
-use super::exit::{Exit, Fault, data, say, say_failure};
+use super::exit::{Exit, Fault, coloured, data, say, say_failure};
 use super::lock::Held;
 use super::picture::{self, Pictures};
 use super::progress;
@@ -238,7 +238,7 @@ pub(super) fn tell(report: &Report, json: bool, quiet: bool) -> Result<(), Fault
         let text = serde_json::to_string_pretty(report);
         data(&text.map_err(|error| Fault::new(Exit::Fault, format!("cannot write the report: {error}")))?);
     } else if !quiet {
-        data(&table::report(report));
+        data(&coloured(&table::report(report)));
     }
     for (name, failure) in report.failures() {
         say_failure(name, failure);

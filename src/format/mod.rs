@@ -203,6 +203,11 @@ impl Format {
         self != Self::Off
     }
 
+    /// Whether a file holds elements with mid-side nodes.
+    pub fn holds_second_order(self) -> bool {
+        matches!(self, Self::Vtu | Self::Inp | Self::Msh | Self::Msh22 | Self::Bdf | Self::Vtk)
+    }
+
     /// The format that the ending of a file name tells, in any case.
     pub fn from_file_name(file_name: &str) -> Option<Self> {
         let (_, ending) = file_name.rsplit_once('.')?;

@@ -4,6 +4,7 @@ pub mod distance;
 pub mod feature;
 pub mod gate;
 pub mod intersection;
+pub mod number;
 pub mod quad_layout;
 pub mod quad_shape;
 pub mod registry;

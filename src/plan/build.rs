@@ -40,6 +40,7 @@ pub fn plan_cases(
     let mut state = CaseContext::new(recipe, context);
     for spec in cases {
         plan_case(spec, columns, &mut state, &mut builder);
+        state.scope.blame(&mut state.problems, &recipe.sources);
         problems.append(&mut state.problems);
         // The faults of the first wrong cases are enough to go on with.
         if problems.len() > 1000 {

@@ -16,6 +16,8 @@ pub struct Context<'a> {
     pub check_file: &'a dyn Fn(&Path) -> Result<(), String>,
     /// The endings of files that can be written, lower case, without the dot.
     pub endings: &'a [&'a str],
+    /// Those among them whose files hold elements with mid-side nodes.
+    pub second_order: &'a [&'a str],
 }
 
 /// A case to plan: a name, and parameters that replace those of the recipe.
@@ -32,6 +34,7 @@ pub(super) struct CaseContext<'r> {
     pub(super) recipe: &'r Recipe,
     pub(super) catalog: &'static [StepDef],
     pub(super) endings: &'r [&'r str],
+    pub(super) second_order: &'r [&'r str],
     pub(super) scope: Scope,
     pub(super) problems: Vec<Diagnostic>,
     /// Where the steps of a name stand among those that could be read.
@@ -47,6 +50,7 @@ impl<'r> CaseContext<'r> {
             recipe,
             catalog: context.catalog,
             endings: context.endings,
+            second_order: context.second_order,
             scope: Scope::default(),
             problems: Vec::new(),
             places: BTreeMap::new(),

@@ -135,7 +135,45 @@ impl Reader<'_, '_> {
             Some(entry) => output.file = self.file(step, port, &entry.value)?,
             None => self.problem(value.span, "this output does not name its `file`", None),
         }
+        self.check_element(step, port, table, output);
         Some(())
+    }
+
+    /// An element that the faces or the file cannot have, which would be passed over in silence.
+    fn check_element(&mut self, step: &str, port: Option<Port>, table: &Table, output: &OutputDecl) {
+        let element = output.element.as_deref();
+        let is_second = |name: &str| matches!(name, "S6" | "S8R");
+        if let (Some(name), Some(entry)) = (element, table.get("element")) {
+            let span = entry.value.span;
+            let other = match (port, name) {
+                (Some(Port::Surface), "S4") => Some(("triangles", "S3")),
+                (Some(Port::Surface), "S8R") => Some(("triangles", "S6")),
+                (Some(Port::Quads | Port::Patches), "S3") => Some(("quads", "S4")),
+                (Some(Port::Quads | Port::Patches), "S6") => Some(("quads", "S8R")),
+                _ => None,
+            };
+            if let Some((faces, other)) = other {
+                let message = format!("the faces of `{step}` are {faces}, which no `{name}` has");
+                self.problem(span, message, Some(format!("write element = \"{other}\"")));
+            }
+            let ending = output.file.extension().map(|ending| ending.to_string_lossy().to_lowercase());
+            let ending = ending.unwrap_or_default();
+            if is_second(name) && !ending.is_empty() && !self.context.second_order.contains(&ending.as_str()) {
+                let message = format!("a file `.{ending}` has no elements with mid-side nodes such as `{name}`");
+                let help = format!("formats that have: {}", self.context.second_order.join(", "));
+                self.problem(span, message, Some(help));
+            }
+        }
+        // An element that there is not has been reported.
+        let is_known = element.is_some() || table.get("element").is_none();
+        if let Some(entry) = table.get("midside-on")
+            && is_known
+            && !element.is_some_and(is_second)
+        {
+            let message = "`midside-on` places mid-side nodes, and this output has none";
+            let help = "write element = \"S6\" for triangles or \"S8R\" for quads, or leave `midside-on` out";
+            self.problem(entry.key, message, Some(help.to_owned()));
+        }
     }
 
     fn element(&mut self, entry: &Entry) -> Option<String> {

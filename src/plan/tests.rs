@@ -38,6 +38,7 @@ fn context() -> Context<'static> {
         catalog: toy::CATALOG,
         check_file: &|path| if path.ends_with("missing.stl") { Err("no such file".to_owned()) } else { Ok(()) },
         endings: &["stl", "vtu", "inp"],
+        second_order: &["vtu", "inp"],
     }
 }
 

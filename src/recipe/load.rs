@@ -1,12 +1,14 @@
 //! Reads a recipe's text and those it extends into one tree whose values remember their file and place.
 //!
-//! Tables merge key by key; arrays, single values, and a step whose `use` differs replace what was there.
+//! Tables merge key by key; arrays, single values, a step whose `use` differs, and a parameter of another form replace
+//! what was there. `drop` takes entries away.
 
 use std::path::{Component, Path, PathBuf};
 
 use toml::de::DeTable;
 
 use super::diagnostic::Diagnostic;
+use super::drop;
 use super::source::{SourceMap, Span};
 use super::tree::{Entry, Node, Table};
 
@@ -50,7 +52,11 @@ impl Chain<'_> {
     fn file(&mut self, path: &Path, text: &str) -> Option<Table> {
         let folder = path.parent().unwrap_or(Path::new(""));
         let mut table = parse(&path.display().to_string(), folder, text, self.sources, self.problems)?;
-        let Some(extends) = table.take("extends") else { return Some(table) };
+        let dropped = table.take("drop");
+        let Some(extends) = table.take("extends") else {
+            self.problems.extend(dropped.as_ref().map(drop::without_base));
+            return Some(table);
+        };
         let span = extends.value.span;
         let Node::Text(name) = &extends.value.value else {
             let message = format!("`extends` names one recipe file, got {}", extends.value.value.kind());
@@ -58,7 +64,12 @@ impl Chain<'_> {
             return Some(table);
         };
         match self.base(&folder.join(name), span) {
-            Some(base) => Some(merge(base, table, &[])),
+            Some(mut base) => {
+                if let Some(dropped) = &dropped {
+                    drop::take_away(&mut base, dropped, self.problems);
+                }
+                Some(merge(base, table, &[]))
+            }
             None => Some(table),
         }
     }
@@ -121,7 +132,12 @@ fn parse(
 
 /// Lays `over` on `base`. `path` is where in the recipe the two tables stand.
 fn merge(mut base: Table, over: Table, path: &[&str]) -> Table {
-    if path.len() == 2 && path[0] == "steps" && replaces_step(&base, &over) {
+    let replaces = match path {
+        ["steps", _] => replaces_step(&base, &over),
+        ["steps", _, _] => is_another_variant(&base, &over),
+        _ => false,
+    };
+    if replaces {
         return over;
     }
     for (key, entry) in over.entries {
@@ -149,6 +165,12 @@ fn replaces_step(base: &Table, over: &Table) -> bool {
         (Some(below), Some(above)) => below.value.value != above.value.value,
         (None, _) | (_, None) => false,
     }
+}
+
+/// Whether two tables of one parameter are of different forms, as `{ field }` and `{ default, groups }` are: they have
+/// no key in common, and one with keys of both would mean nothing.
+fn is_another_variant(base: &Table, over: &Table) -> bool {
+    !over.entries.is_empty() && !over.entries.keys().any(|key| base.get(key).is_some())
 }
 
 /// The path without `.` and with `x/..` taken out, without looking at the disk.

@@ -6,6 +6,7 @@
 mod argument;
 mod circle;
 pub mod diagnostic;
+mod drop;
 pub mod expression;
 mod load;
 pub mod scope;
@@ -30,8 +31,8 @@ use suggest::did_you_mean;
 pub use tree::{Entry, Node, Table, Tree};
 
 /// The sections of a recipe.
-const SECTIONS: [&str; 9] =
-    ["name", "description", "inputs", "params", "steps", "gates", "outputs", "sweep", "extends"];
+const SECTIONS: [&str; 10] =
+    ["name", "description", "inputs", "params", "steps", "gates", "outputs", "sweep", "extends", "drop"];
 
 /// What the command line replaces.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -146,7 +147,14 @@ impl Recipe {
             (name.clone(), path)
         };
         let inputs: BTreeMap<_, _> = self.inputs.entries.iter().map(input).collect();
-        Scope::new(&params, inputs, &self.sources, problems)
+        let mut scope = Scope::new(&params, inputs, &self.sources, problems);
+        let is_foreign = |name: &str, span: Span| {
+            let own = self.params.get(name).map(|entry| entry.value.span);
+            own != Some(span) || self.sources.file(span).is_some_and(|file| file.name.starts_with("--"))
+        };
+        let places = params.entries.iter().map(|(name, entry)| (name.clone(), entry.value.span));
+        scope.origins = places.filter(|(name, span)| is_foreign(name, *span)).collect();
+        scope
     }
 
     /// The path of a file that a value names, as it is opened; `None` when the value is no text.

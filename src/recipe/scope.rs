@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use super::circle;
-use super::diagnostic::Diagnostic;
+use super::diagnostic::{Diagnostic, Label};
 use super::expression::{self, Expression, ExpressionError, Value};
 use super::source::{SourceMap, Span};
 use super::suggest::did_you_mean;
@@ -18,6 +18,9 @@ pub struct Scope {
     pub params: BTreeMap<String, Option<Value>>,
     /// Paths of input files, as they are opened.
     pub inputs: BTreeMap<String, Option<PathBuf>>,
+    /// Where the parameters are written whose values do not stand in the recipe's own section: on the command line, or in
+    /// the axes of a sweep.
+    pub origins: BTreeMap<String, Span>,
 }
 
 impl Scope {
@@ -28,7 +31,7 @@ impl Scope {
         sources: &SourceMap,
         problems: &mut Vec<Diagnostic>,
     ) -> Self {
-        let mut scope = Self { params: BTreeMap::new(), inputs };
+        let mut scope = Self { params: BTreeMap::new(), inputs, origins: BTreeMap::new() };
         let names: Vec<&str> = params.entries.keys().map(String::as_str).collect();
         let mut formulas: Vec<Option<(Expression, Span)>> = Vec::new();
         for (name, entry) in &params.entries {
@@ -67,6 +70,23 @@ impl Scope {
         let lookup = |name: &str| self.lookup(name);
         expression::evaluate(formula, &lookup)
             .map_err(|error| (!error.message.is_empty()).then(|| diagnostic(error, text, sources)))
+    }
+
+    /// Moves problems with an expression to where the values in it were set, when that is not the recipe: what is wrong is
+    /// the argument, and the recipe only uses it.
+    pub fn blame(&self, problems: &mut [Diagnostic], sources: &SourceMap) {
+        for problem in problems {
+            let Some(formula) = problem.labels.first().and_then(|first| formula_at(first.span, sources)) else {
+                continue;
+            };
+            let mut places: Vec<Span> =
+                formula.names().into_iter().filter_map(|(name, _)| self.origins.get(name)).copied().collect();
+            places.sort_unstable();
+            places.dedup();
+            let set = places.into_iter().map(|span| Label { span, text: String::new() });
+            let labels: Vec<Label> = set.chain(problem.labels.drain(..)).collect();
+            problem.labels = labels;
+        }
     }
 
     fn lookup(&self, name: &str) -> Result<Value, ExpressionError> {
@@ -187,6 +207,17 @@ fn plain(tree: &Tree, sources: &SourceMap) -> Result<Plain, Diagnostic> {
 
 fn percent(text: &str) -> Option<f64> {
     text.strip_suffix('%')?.trim().parse().ok().filter(|value: &f64| value.is_finite())
+}
+
+/// The formula, or the part of one, that stands at a place. A key of the same spelling is none.
+fn formula_at(span: Span, sources: &SourceMap) -> Option<Expression> {
+    let file = sources.file(span)?;
+    let start = file.local(span).start;
+    let before = &file.text[file.line(file.line_of(start)).start..start];
+    let written = sources.text(span).trim_matches(['"', '\'']);
+    let whole = written.strip_prefix('=');
+    let inside = before.contains("\"=") || before.contains("'=");
+    expression::parse(whole.or(inside.then_some(written))?).ok()
 }
 
 /// Where the formula of a value stands in its text. An escaped string cannot be mapped; then the whole value.

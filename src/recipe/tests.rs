@@ -97,6 +97,55 @@ fn later_recipes_lie_on_those_they_extend() {
 }
 
 #[test]
+fn a_recipe_takes_things_of_its_base_away() {
+    let base =
+        "[steps.a]\nuse = \"x\"\n[gates.a]\nclosed = true\nmanifold = true\n[outputs]\na = \"a.vtu\"\nb = \"b.vtu\"\n";
+    let main = "extends = \"base.toml\"\ndrop = [\"gates.a.closed\", \"outputs.a\", \"outputs.\\\"b\\\"\"]\n[outputs]\na = \"own.vtu\"\n";
+    let recipe = load(&[("main.toml", main), ("base.toml", base)], &Overrides::default()).unwrap();
+    assert_eq!(recipe.problems, []);
+    let Node::Table(gate) = &recipe.gates.get("a").unwrap().value.value else { panic!("a table") };
+    assert_eq!(gate.entries.keys().collect::<Vec<_>>(), ["manifold"]);
+    assert_eq!(recipe.outputs.get("a").unwrap().value.value, Node::Text("own.vtu".to_owned()));
+    assert!(recipe.outputs.get("b").is_none());
+}
+
+#[test]
+fn what_cannot_be_dropped_is_told() {
+    let base = "name = \"base\"\n[gates.fe]\nclosed = true\n";
+    let told = |drop: &str| {
+        let main = format!("extends = \"base.toml\"\ndrop = {drop}\n");
+        let recipe = load(&[("main.toml", &main), ("base.toml", base)], &Overrides::default()).unwrap();
+        Diagnostics::new(recipe.sources, recipe.problems).render(false)
+    };
+    for (drop, message, help) in [
+        ("[\"gates.fe.closde\"]", "the extended recipe has no `gates.fe.closde`", "did you mean `closed`?"),
+        ("[\"gates.ef.closed\"]", "the extended recipe has no `gates.ef`", "it has: `fe`"),
+        ("[\"name.x\"]", "`name` of the extended recipe has no parts", "drop `name` whole"),
+        ("[\"a = 1\\nb\"]", "is not the name of an entry", "gates.fe.closed"),
+        ("[\"\"]", "`` is not the name of an entry", "gates.fe.closed"),
+        ("[4]", "`drop` lists names, got a number", "gates.fe.closed"),
+    ] {
+        let told = told(drop);
+        assert!(told.contains(message) && told.contains(help) && told.contains("main.toml:2:"), "{told}");
+    }
+    assert_eq!(problems("drop = [\"steps.a\"]\n").len(), 1);
+}
+
+#[test]
+fn a_value_of_another_variant_replaces_the_whole_one() {
+    let base =
+        "[steps.a]\nuse = \"x\"\nsize = { default = 1, groups = { r = 2 } }\nball = { centre = 1, radius = 2 }\n";
+    let main = "extends = \"base.toml\"\n[steps.a]\nsize = { field = \"f\" }\nball = { radius = 3 }\n";
+    let recipe = load(&[("main.toml", main), ("base.toml", base)], &Overrides::default()).unwrap();
+    let keys = |name: &str| match &recipe.step("a").unwrap().table.get(name).unwrap().value.value {
+        Node::Table(table) => table.entries.keys().cloned().collect::<Vec<_>>(),
+        _ => panic!("a table"),
+    };
+    assert_eq!(keys("size"), ["field"]);
+    assert_eq!(keys("ball"), ["centre", "radius"]);
+}
+
+#[test]
 fn recipes_that_extend_each_other_are_refused() {
     let found =
         load(&[("main.toml", "extends = \"a.toml\""), ("a.toml", "extends = \"./main.toml\"")], &Overrides::default())

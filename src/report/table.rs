@@ -157,6 +157,22 @@ pub fn text(table: &Table) -> String {
     lines.join("\n")
 }
 
+/// A paragraph as lines of at most 80 columns, each after `indent` blanks. A word longer than that has a line of its own.
+pub fn wrapped(text: &str, indent: usize) -> Vec<String> {
+    const WIDTH: usize = 80;
+    let mut lines: Vec<String> = Vec::new();
+    for word in text.split_whitespace() {
+        match lines.last_mut() {
+            Some(line) if line.chars().count() + 1 + word.chars().count() <= WIDTH => {
+                line.push(' ');
+                line.push_str(word);
+            }
+            _ => lines.push(format!("{:indent$}{word}", "")),
+        }
+    }
+    lines
+}
+
 /// Aligns number columns to the right.
 pub fn align(table: &mut Table, columns: &[usize]) {
     for column in columns {

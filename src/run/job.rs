@@ -131,6 +131,7 @@ fn step_task(
         artifacts.push((name, shared.artifact(input)?));
     }
     let inputs = Inputs::new(artifacts);
+    shared.needs().check(shared.plan, id, &inputs).map_err(Finished::Failed)?;
     let work = || catch_unwind(AssertUnwindSafe(|| step.run(&inputs, watch)));
     let produced = shared.pool()?.install(work).unwrap_or_else(|payload| Err(panicked(payload.as_ref())));
     let produced = produced.map_err(Finished::Failed)?;

@@ -23,6 +23,7 @@ mod figures;
 mod gate;
 mod guard;
 mod job;
+mod names;
 pub mod observe;
 pub mod outcome;
 mod output;

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
+use super::names::Needs;
 use super::{RunError, RunOptions};
 use crate::metric::gate::GateReport;
 use crate::plan::{ContentHash, Key, Plan, Record, Task, TaskId, task_key, task_record};
@@ -27,6 +28,7 @@ pub(super) struct Shared<'a> {
     reports: Vec<OnceLock<GateReport>>,
     pool: OnceLock<Arc<rayon::ThreadPool>>,
     unsaved: OnceLock<StoreError>,
+    needs: OnceLock<Needs>,
 }
 
 /// Why an artifact cannot be had.
@@ -49,6 +51,7 @@ impl<'a> Shared<'a> {
             reports: (0..plan.len()).map(|_| OnceLock::new()).collect(),
             pool: OnceLock::new(),
             unsaved: OnceLock::new(),
+            needs: OnceLock::new(),
         }
     }
 
@@ -85,6 +88,11 @@ impl<'a> Shared<'a> {
     pub(super) fn learn(&self, task: TaskId, content: ContentHash) -> Option<ContentHash> {
         let known = *self.contents[task.index()].get_or_init(|| content);
         (known != content).then_some(known)
+    }
+
+    /// Who needs which groups; found when the first step works.
+    pub(super) fn needs(&self) -> &Needs {
+        self.needs.get_or_init(|| Needs::of(self.plan))
     }
 
     /// Notes the verdicts of a gate.

@@ -4,6 +4,7 @@ use std::fmt::Write;
 
 use serde_json::Value;
 
+use super::nested::{NestedKey, nested_tables};
 use crate::metric::registry::{METRICS, Needs, Unit};
 use crate::step::parameters::{ParameterSchema, reference};
 use crate::step::{OutPort, Port, StepDef};
@@ -58,6 +59,11 @@ fn step(def: &StepDef, page: &mut String) {
             let _ = writeln!(page, "| `{name}` | {kind} | {default} | {range} | {} |", cell(doc(schema)));
         }
     }
+    let before = page.len();
+    tables(&params, page);
+    if page.len() > before {
+        page.insert(before, '\n');
+    }
     if !stats.properties.is_empty() {
         page.push_str("\n| statistic | type | meaning |\n|---|---|---|\n");
         for (name, schema) in &stats.properties {
@@ -107,8 +113,28 @@ fn range(schema: &Value) -> String {
     [low, high].into_iter().flatten().collect::<Vec<_>>().join(", ")
 }
 
+/// The nested tables of the parameters: their keys, and an example of each.
+fn tables(params: &ParameterSchema, page: &mut String) {
+    for name in params.properties.keys() {
+        for table in nested_tables(name, params) {
+            let key = |key: &NestedKey| {
+                let default = match key.schema.get("default") {
+                    Some(value) if !value.is_null() => format!(", default {}", default(&key.schema)),
+                    _ if key.required => String::new(),
+                    _ => ", may be left out".to_owned(),
+                };
+                let doc = doc(&key.schema).replace('\n', " ");
+                let doc = if doc.is_empty() { doc } else { format!(": {}", doc.trim_end_matches('.')) };
+                format!("`{}` ({}{default}){doc}", key.name, kind(&key.schema, params))
+            };
+            let keys: Vec<String> = table.keys.iter().map(key).collect();
+            let _ = writeln!(page, "- table `{name}`: {}. Example: `{}`", keys.join("; "), table.example);
+        }
+    }
+}
+
 /// A schema's type in a reader's words.
-fn kind(schema: &Value, all: &ParameterSchema) -> String {
+pub fn kind(schema: &Value, all: &ParameterSchema) -> String {
     if let Some(name) = reference(schema) {
         return match name.as_str() {
             "Length" | "Share" | "Angle" | "Sizing" => name.to_lowercase(),

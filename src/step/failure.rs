@@ -48,7 +48,7 @@ pub struct StepFailure {
 impl StepFailure {
     /// A failure of this kind.
     pub fn new(kind: FailureKind, message: impl Into<String>) -> Self {
-        Self { kind, message: message.into(), help: None, elements: Vec::new() }
+        Self { kind, message: without_code(&message.into()), help: None, elements: Vec::new() }
     }
 
     /// The input is wrong.
@@ -68,12 +68,40 @@ impl StepFailure {
         self
     }
 
+    /// Puts what was perhaps meant before what the user may try.
+    #[must_use]
+    pub fn with_guess(mut self, guess: Option<String>) -> Self {
+        self.help = match (guess, self.help) {
+            (Some(guess), Some(help)) => Some(format!("{guess} Else {help}")),
+            (guess, help) => guess.or(help),
+        };
+        self
+    }
+
     /// Adds the elements at fault.
     #[must_use]
     pub fn with_elements(mut self, elements: Vec<ElementRef>) -> Self {
         self.elements = elements;
         self
     }
+}
+
+/// A message without the number that the system adds to its errors: `No such file or directory (os error 2)` says it all
+/// before the parenthesis.
+pub fn without_code(message: &str) -> String {
+    let mut text = String::with_capacity(message.len());
+    let mut parts = message.split(" (os error ");
+    text.push_str(parts.next().unwrap_or_default());
+    for part in parts {
+        match part.split_once(')') {
+            Some((code, rest)) if code.parse::<i32>().is_ok() => text.push_str(rest),
+            _ => {
+                text.push_str(" (os error ");
+                text.push_str(part);
+            }
+        }
+    }
+    text
 }
 
 impl fmt::Display for StepFailure {
@@ -87,5 +115,19 @@ impl std::error::Error for StepFailure {}
 impl From<Cancelled> for StepFailure {
     fn from(_: Cancelled) -> Self {
         Self::new(FailureKind::Cancelled, "cancelled")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_systems_numbers_are_left_out() {
+        let told =
+            without_code("cannot read a: No such file (os error 2); b: denied (os error 13), or (os error x) not");
+        assert_eq!(told, "cannot read a: No such file; b: denied, or (os error x) not");
+        let error = std::io::Error::from_raw_os_error(2);
+        assert!(!StepFailure::failed(error.to_string()).message.contains("os error"));
     }
 }

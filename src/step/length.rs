@@ -196,6 +196,17 @@ pub enum Sizing {
     },
 }
 
+impl Sizing {
+    /// What a number of mesh units that makes far too many elements was perhaps meant to be: `0.03` as `"3%"`, `2` as
+    /// `"2%"`.
+    pub fn perhaps_meant(&self) -> Option<String> {
+        let Self::Uniform(Length::Absolute(length)) = *self else { return None };
+        // Rounded, so that 0.07 times 100 is 7.
+        let percent = if length < 0.5 { (length * 1e8).round() / 1e6 } else { length };
+        (0.01..=20.0).contains(&percent).then(|| format!("did you mean \"{percent}%\"?"))
+    }
+}
+
 impl From<Length> for Sizing {
     fn from(length: Length) -> Self {
         Self::Uniform(length)
@@ -279,18 +290,32 @@ impl JsonSchema for Sizing {
                 length,
                 {
                     "type": "object",
-                    "properties": { "field": { "type": "string" } },
+                    "properties": {
+                        "field": {
+                            "type": "string",
+                            "description": "The name of a field with a length, in mesh units, at each vertex or face."
+                        }
+                    },
                     "required": ["field"],
-                    "additionalProperties": false
+                    "additionalProperties": false,
+                    "examples": [{ "field": "size" }]
                 },
                 {
                     "type": "object",
                     "properties": {
-                        "default": length,
-                        "groups": { "type": "object", "additionalProperties": length }
+                        "default": {
+                            "allOf": [length],
+                            "description": "The length where no group of the table is."
+                        },
+                        "groups": {
+                            "type": "object",
+                            "description": "Lengths by face group; where groups overlap, the smallest one holds.",
+                            "additionalProperties": length
+                        }
                     },
                     "required": ["default"],
-                    "additionalProperties": false
+                    "additionalProperties": false,
+                    "examples": [{ "default": "2%", "groups": { "rim": "0.5%" } }]
                 }
             ]
         })

@@ -131,6 +131,11 @@ pub trait Step {
     /// Statistics; replayed with a cached result.
     type Stats: Serialize + JsonSchema;
 
+    /// The groups that the result has besides those of its inputs.
+    fn new_groups(_params: &Self::Params) -> Vec<String> {
+        Vec::new()
+    }
+
     /// Runs the step for one of its outputs.
     fn run(
         inputs: &Inputs,
@@ -203,6 +208,9 @@ pub trait BoundStep: Send + Sync {
     /// Parameters with defaults filled in, for keys and explanations.
     fn canonical(&self) -> serde_json::Value;
 
+    /// The groups that the result has besides those of its inputs.
+    fn new_groups(&self) -> Vec<String>;
+
     /// Runs the step for one of its outputs; statistics come as JSON.
     fn run(
         &self,
@@ -220,6 +228,10 @@ struct Bound<S: Step> {
 impl<S: Step> BoundStep for Bound<S> {
     fn canonical(&self) -> serde_json::Value {
         serde_json::to_value(&self.params).unwrap_or(serde_json::Value::Null)
+    }
+
+    fn new_groups(&self) -> Vec<String> {
+        S::new_groups(&self.params)
     }
 
     fn run(

@@ -377,10 +377,21 @@ impl From<ImproveQualityError> for StepFailure {
                 .with_help("give a number in squared mesh units, or use `tolerance-mode = \"quadric-rms\"`"),
             ImproveQualityError::Size(failure) => Self { message, ..failure },
             ImproveQualityError::NotASurface(_) => Self::bad_input(message).with_help("run `repair` first"),
-            ImproveQualityError::Refine(_) => Self::failed(message).with_help("give a larger `max-edge`"),
-            ImproveQualityError::OutOfRange { .. } | ImproveQualityError::Locks(_) => Self::failed(message),
+            ImproveQualityError::Refine(RefineError::TooManyFaces { .. }) => {
+                Self::failed(message).with_help("give a larger `max-edge`, or a larger `max-faces` if that is meant")
+            }
+            ImproveQualityError::Refine(_) | ImproveQualityError::OutOfRange { .. } | ImproveQualityError::Locks(_) => {
+                Self::failed(message)
+            }
         }
     }
+}
+
+/// The failure, with what was perhaps meant by a size that makes too many faces.
+fn failure(error: ImproveQualityError, params: &ImproveQualityParams) -> StepFailure {
+    let too_many = matches!(error, ImproveQualityError::Refine(RefineError::TooManyFaces { .. }));
+    let guess = params.max_edge.as_ref().filter(|_| too_many).and_then(Sizing::perhaps_meant);
+    StepFailure::from(error).with_guess(guess)
 }
 
 /// The room's entry in the catalog.
@@ -422,10 +433,10 @@ impl crate::step::Step for Step {
         let reference = inputs.surface_opt("reference")?.unwrap_or(surface);
         let input = ImproveQualityInput { surface, reference, locks: locks.rules() };
         if output == "hierarchy" {
-            let (hierarchy, stats) = record_quality(input, params, watch)?;
+            let (hierarchy, stats) = record_quality(input, params, watch).map_err(|error| failure(error, params))?;
             return Ok(Produced { artifact: Artifact::Hierarchy(Arc::new(hierarchy)), stats });
         }
-        let (surface, stats) = improve_quality(input, params, watch)?;
+        let (surface, stats) = improve_quality(input, params, watch).map_err(|error| failure(error, params))?;
         Ok(Produced { artifact: Artifact::Surface(Arc::new(surface)), stats })
     }
 }

@@ -168,7 +168,12 @@ impl StepContract for Step {
         locks: &Locks,
         watch: &Watch,
     ) -> Result<Produced<RefineStats>, StepFailure> {
-        let (surface, stats) = refine(inputs.surface("from")?, params, locks, watch)?;
+        let refined = refine(inputs.surface("from")?, params, locks, watch);
+        let (surface, stats) = refined.map_err(|error| {
+            let too_many = matches!(error, RefineError::Refine(Reason::TooManyFaces { .. }));
+            let guess = too_many.then(|| params.max_edge.perhaps_meant()).flatten();
+            StepFailure::from(error).with_guess(guess)
+        })?;
         Ok(Produced { artifact: Artifact::Surface(Arc::new(surface)), stats })
     }
 }

@@ -83,6 +83,7 @@ pub struct RoughQuadsParams {
 #[serde(untagged)]
 pub enum BeltThickness {
     /// Counted in strips of triangles.
+    #[schemars(extend("examples" = [{ "strips": 3 }]))]
     Strips {
         /// How many.
         strips: usize,

@@ -214,6 +214,10 @@ impl StepContract for Step {
     type Params = SelectParams;
     type Stats = SelectStats;
 
+    fn new_groups(params: &SelectParams) -> Vec<String> {
+        vec![params.name.clone()]
+    }
+
     fn run(
         inputs: &Inputs,
         _output: &str,

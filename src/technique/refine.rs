@@ -15,16 +15,17 @@
 //! Departure: edges between faces of one plane may be flipped before and between rounds, see [`Flips`]. The flat faces of
 //! CAD programs are fans of needles, each of which would be halved to pieces of its own.
 
+mod count;
 mod flips;
 
 use crate::mesh::freedom::ResolvedFreedom;
-use crate::mesh::geometry::triangle_area;
 use crate::mesh::id::{Edge, Face};
 use crate::mesh::topology::EdgeTable;
 use crate::mesh::{EdgeId, FaceId, FreedomError, IdVec, LockRules, Surface, resolve_freedom};
 use crate::technique::flat_flips::FlipError;
 use crate::technique::halve_edges::{Halved, agree_on_seams, halve_edges, predict_faces, seam_copies};
 use crate::watch::{Cancelled, Watch};
+use count::least_faces;
 use flips::Flattener;
 
 /// The usual limit of faces: about 3 GB of memory.
@@ -168,9 +169,7 @@ pub fn refine(
         flattener.flip(&mut start, &mut limit, 0, &mut report)?;
     }
     let mut current = Round::new(start, locks)?;
-    if current.may.iter().all(|&may| may) {
-        check_count(least_faces(&current.surface, &limit, flips), max_faces)?;
-    }
+    check_count(least_faces(&current, &limit, flips, max_faces), max_faces)?;
     loop {
         watch.check()?;
         let limits = current.limits(&limit);
@@ -204,29 +203,6 @@ fn check_limits(max_edge: &MaxEdge) -> Result<(), RefineError> {
 
 fn check_count(predicted: usize, max_faces: usize) -> Result<(), RefineError> {
     if predicted > max_faces { Err(RefineError::TooManyFaces { predicted, max_faces }) } else { Ok(()) }
-}
-
-/// A lower bound of the faces that refining makes where no edge is kept, before anything is made.
-///
-/// A part of a face has at most one piece of each of its sides, and at most the area of an equilateral triangle whose
-/// side is the limit. Where the limit varies in a face, its largest value there counts. Where edges are flipped, parts of
-/// different faces are joined, and only the area counts.
-fn least_faces(surface: &Surface, max_edge: &MaxEdge, flips: Flips) -> usize {
-    let mut total = 0.0;
-    for f in surface.faces.ids() {
-        let corners = surface.corners(f);
-        let limit = match max_edge {
-            MaxEdge::Uniform(length) => *length,
-            MaxEdge::Corners(lengths) => lengths[f].iter().copied().fold(0.0, f64::max),
-        };
-        let longest = crate::mesh::geometry::side_lengths(corners).into_iter().fold(0.0, f64::max);
-        let by_area = triangle_area(corners) / (limit * limit * 3.0_f64.sqrt() / 4.0);
-        total += match flips {
-            Flips::None => (longest / limit).max(by_area).max(1.0).floor(),
-            Flips::Flat => by_area,
-        };
-    }
-    total as usize
 }
 
 /// A surface between two rounds of halving.
@@ -336,6 +312,7 @@ fn inherit_limits(old: &MaxEdge, surface: &Surface, halved: &Halved) -> MaxEdge 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::mesh::geometry::triangle_area;
     use crate::mesh::halfedge::tests::surface;
     use crate::mesh::validate::validate_surface;
     use crate::mesh::{EdgeMark, Field, Freedom, MarkCause, SeamId, Support, VertexId, edge_key};

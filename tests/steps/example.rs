@@ -40,7 +40,7 @@ fn runs(step: &StepDef, folder: &Path) {
     let text = format!("name = \"example\"\n{BEFORE}[steps.example]\n{}", step.example);
     let load = |_: &Path| Ok(text.clone());
     let recipe = Recipe::load(&folder.join("example.toml"), &load, &Overrides::default()).expect("a recipe");
-    let context = Context { catalog: CATALOG, check_file: &|_| Ok(()), endings: &[] };
+    let context = Context { catalog: CATALOG, check_file: &|_| Ok(()), endings: &[], second_order: &[] };
     let plan = plan(&recipe, &context).unwrap_or_else(|problems| panic!("{}: {}", step.name, problems.render(false)));
     let options = RunOptions { only: vec!["example".to_owned()], ..RunOptions::new("example", folder.join("out"), 1) };
     let store = Store::open(&folder.join("cache")).expect("a store");

@@ -1,6 +1,7 @@
 //! Judging a mesh by the checks of a gate.
 
 use super::super::distance::{Decision, Target, decide, upper_bound};
+use super::super::number::number_text;
 use super::super::registry::{MetricDef, Needs, Unit, find, lost_groups};
 use super::super::{Subject, Value};
 use super::column::{Column, Extreme, column, fault_at};
@@ -103,13 +104,13 @@ fn resolve(subject: &Subject<'_>, metric: &MetricDef, check: &Check) -> Bounds {
     let mut number = |relation: &str, limit: Option<Limit>| {
         let limit = limit?;
         let (value, text) = match limit {
-            Limit::Number(value) => (value, format!("{relation} {value}")),
+            Limit::Number(value) => (value, format!("{relation} {}", number_text(value))),
             Limit::Flag(flag) => (f64::from(u8::from(flag)), format!("{relation} {flag}")),
             Limit::Percent(percent) => {
                 let whole = if metric.unit == Unit::Length { of_diagonal.extent().bounds.diagonal() } else { 1.0 };
                 // As steps resolve their lengths, to the last bit.
                 let value = percent / 100.0 * whole;
-                (value, format!("{relation} {percent}% = {value}"))
+                (value, format!("{relation} {percent}% = {}", number_text(value)))
             }
         };
         words.push(text.trim_start().to_owned());
@@ -121,12 +122,15 @@ fn resolve(subject: &Subject<'_>, metric: &MetricDef, check: &Check) -> Bounds {
     let theirs = subject.reference().and_then(|r| (metric.measure)(r)).map(Value::as_f64);
     if check.same_as_reference && metric.needs != Needs::Reference {
         equals = Some(theirs.unwrap_or(f64::NAN));
-        words.push(format!("the same as the reference{}", theirs.map_or(String::new(), |v| format!(" = {v}"))));
+        words.push(format!(
+            "the same as the reference{}",
+            theirs.map_or(String::new(), |v| format!(" = {}", number_text(v)))
+        ));
     }
     if check.no_more_than_reference && metric.needs != Needs::Reference {
         let theirs = theirs.unwrap_or(f64::NAN);
         at_most = Some(at_most.map_or(theirs, |b| b.min(theirs)));
-        words.push(format!("no more than the reference = {theirs}"));
+        words.push(format!("no more than the reference = {}", number_text(theirs)));
     }
     Bounds { at_least, at_most, equals, text: words.join(", ") }
 }

@@ -8,6 +8,7 @@ use crate::step::{Length, Resolution};
 /// A ball.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
+#[schemars(example = Self { centre: [10.0, 0.0, 0.0], radius: Length::Percent(5.0) })]
 pub struct Ball {
     /// The centre, in mesh units.
     pub centre: [f64; 3],
@@ -18,6 +19,7 @@ pub struct Ball {
 /// A box along the axes.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
+#[schemars(example = Self { min: [0.0; 3], max: [20.0, 20.0, 5.0] })]
 pub struct BoxRegion {
     /// The corner with the smallest coordinates, in mesh units.
     pub min: [f64; 3],
@@ -28,6 +30,7 @@ pub struct BoxRegion {
 /// The side of a plane that its normal points to.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
+#[schemars(example = Self { point: [0.0; 3], normal: [0.0, 0.0, 1.0] })]
 pub struct HalfSpace {
     /// A point of the plane, in mesh units.
     pub point: [f64; 3],

@@ -306,6 +306,13 @@ fn max_size(
     })
 }
 
+/// The failure, with what was perhaps meant by a size that makes too many faces.
+fn failure(error: ControlPropertiesError, params: &ControlPropertiesParams) -> StepFailure {
+    let too_many = matches!(error, ControlPropertiesError::TooManyFaces { .. });
+    let guess = params.max_size.as_ref().filter(|_| too_many).and_then(Sizing::perhaps_meant);
+    StepFailure::from(error).with_guess(guess)
+}
+
 /// The room's entry in the catalog.
 pub struct Step;
 
@@ -344,10 +351,10 @@ impl crate::step::Step for Step {
         let reference = inputs.surface_opt("reference")?.unwrap_or(surface);
         let input = ControlPropertiesInput { surface, reference, locks: locks.rules() };
         if output == "hierarchy" {
-            let (hierarchy, stats) = record_properties(input, params, watch)?;
+            let (hierarchy, stats) = record_properties(input, params, watch).map_err(|error| failure(error, params))?;
             return Ok(Produced { artifact: Artifact::Hierarchy(Arc::new(hierarchy)), stats });
         }
-        let (surface, stats) = control_properties(input, params, watch)?;
+        let (surface, stats) = control_properties(input, params, watch).map_err(|error| failure(error, params))?;
         Ok(Produced { artifact: Artifact::Surface(Arc::new(surface)), stats })
     }
 }

@@ -14,6 +14,7 @@ use crate::step::{Angle, Length};
 /// A box along the axes.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
+#[schemars(example = Self { min: [0.0; 3], max: [20.0, 20.0, 5.0] })]
 pub struct SelectBox {
     /// The corner with the smallest coordinates, in mesh units.
     pub min: [f64; 3],
@@ -24,6 +25,7 @@ pub struct SelectBox {
 /// A ball.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
+#[schemars(example = Self { centre: [10.0, 0.0, 0.0], radius: Length::Percent(5.0) })]
 pub struct Sphere {
     /// The centre, in mesh units.
     pub centre: [f64; 3],
@@ -34,6 +36,7 @@ pub struct Sphere {
 /// A solid cylinder from one point of its axis to another.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
+#[schemars(example = Self { start: [0.0; 3], end: [0.0, 0.0, 20.0], radius: Length::Absolute(4.0) })]
 pub struct Cylinder {
     /// Where the axis begins, in mesh units.
     pub start: [f64; 3],
@@ -46,6 +49,7 @@ pub struct Cylinder {
 /// A plane with a thickness.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
+#[schemars(example = Self { point: [0.0; 3], normal: [0.0, 0.0, 1.0], distance: Length::Percent(0.1) })]
 pub struct Plane {
     /// A point of the plane, in mesh units.
     pub point: [f64; 3],
@@ -63,6 +67,7 @@ fn thickness() -> Length {
 /// Directions within an angle of one.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
+#[schemars(example = Self { direction: [0.0, 0.0, 1.0], angle: Angle(10.0) })]
 pub struct NormalCone {
     /// The direction, of any length above 0.
     pub direction: [f64; 3],
@@ -78,6 +83,7 @@ fn cone() -> Angle {
 /// Rims of an open surface.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
+#[schemars(example = Self { rank: Some(1) })]
 pub struct BoundaryLoop {
     /// Which one, by length: 1 is the longest. Default: all.
     #[serde(default, skip_serializing_if = "Option::is_none")]
