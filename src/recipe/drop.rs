@@ -44,14 +44,12 @@ fn take(base: &mut Table, name: &str, span: Span) -> Result<(), Diagnostic> {
         if table.get(segment).is_none() {
             return Err(unknown(&path[..=depth], table, span));
         }
-        match table.entries.get_mut(segment).map(|entry| &mut entry.value.value) {
-            Some(Node::Table(inner)) => table = inner,
-            _ => {
-                let whole = path[..=depth].join(".");
-                let message = format!("`{whole}` of the extended recipe has no parts");
-                return Err(Diagnostic::error(span, message).help(format!("drop `{whole}` whole")));
-            }
-        }
+        let Some(Node::Table(inner)) = table.entries.get_mut(segment).map(|entry| &mut entry.value.value) else {
+            let whole = path[..=depth].join(".");
+            let message = format!("`{whole}` of the extended recipe has no parts");
+            return Err(Diagnostic::error(span, message).help(format!("drop `{whole}` whole")));
+        };
+        table = inner;
     }
     match table.take(last) {
         Some(_) => Ok(()),
