@@ -13,4 +13,5 @@ pub mod step;
 pub mod steps;
 pub mod store;
 pub mod technique;
+pub mod terminal;
 pub mod watch;

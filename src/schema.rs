@@ -289,6 +289,10 @@ fn check(limit: &Value) -> Value {
                     "except": {
                         "description": "Face groups that are not judged.",
                         "anyOf": [{ "type": "string" }, { "type": "array", "items": { "type": "string" } }]
+                    },
+                    "files": {
+                        "description": "`groups-kept` only: the files written must hold the groups too.",
+                        "type": "boolean"
                     }
                 }
             }

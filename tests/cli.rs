@@ -145,10 +145,10 @@ fn convert_tells_what_a_format_cannot_hold() {
     fs::write(desk.path("named.obj"), CUBE.replacen("f ", "g lid\nf ", 1) + "g rim\nl 1 2\n").unwrap();
     let kept = predicate::str::contains("not kept").not();
     desk.meshmill(&["convert", "named.obj", "named.vtu"]).assert().success().stderr(kept);
-    let lost = predicate::str::contains("groups of faces `lid`").and(predicate::str::contains("groups of edges `rim`"));
+    let lost = predicate::str::contains("face groups `lid`").and(predicate::str::contains("edge groups `rim`"));
     let lost = lost.and(predicate::str::contains("try: --text"));
     desk.meshmill(&["convert", "named.obj", "named.stl"]).assert().success().stderr(lost);
-    let points = predicate::str::contains("not kept in CSV: 12 faces");
+    let points = predicate::str::contains("not kept in CSV: 12 of 12 faces");
     desk.meshmill(&["convert", "named.obj", "named.csv"]).assert().success().stderr(points);
 }
 

@@ -4,9 +4,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Which top-level modules each may import. `watch` is open to all.
+/// Which top-level modules each may import. `watch` and `terminal` are open to all.
 const LAYERS: &[(&str, &[&str])] = &[
     ("watch", &[]),
+    ("terminal", &[]),
     ("mesh", &[]),
     ("recipe", &[]),
     ("format", &["mesh"]),
@@ -120,7 +121,7 @@ fn top_names(group: &str) -> Vec<String> {
 }
 
 fn forbidden(file: &str, module: &str, target: &str) -> bool {
-    if target == module || target == "watch" || module == "main" || module == "lib" {
+    if target == module || ["watch", "terminal"].contains(&target) || module == "main" || module == "lib" {
         return false;
     }
     let Some((_, allowed)) = LAYERS.iter().find(|(name, _)| *name == module) else { return true };

@@ -1,12 +1,11 @@
 //! `meshmill convert`: a mesh from any format to any other, with all that it carries; what the other cannot hold is told.
 
-use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::exit::{Exit, Fault, say};
 use crate::format::{self, Format, ReadCounts, WriteOptions};
-use crate::mesh::{Soup, Support};
+use crate::mesh::Soup;
 use crate::run::{VERSION, write_named};
 use crate::watch::Watch;
 
@@ -41,14 +40,14 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Fault> {
     for what in left_out(counts) {
         say(&format!("  left out on reading: {what}"));
     }
-    let lost = lost(format, &soup, &bytes);
+    let lost = not_kept(format, &soup, &bytes);
     for what in &lost {
         say(&format!("  not kept in {}: {what}", format.title()));
     }
     if options.binary
         && !lost.is_empty()
         && let Ok(text) = format::write(format, &soup, &WriteOptions { binary: false, ..options })
-        && self::lost(format, &soup, &text).len() < lost.len()
+        && not_kept(format, &soup, &text).len() < lost.len()
     {
         say("  try: --text, which keeps more");
     }
@@ -66,67 +65,12 @@ fn left_out(counts: ReadCounts) -> impl Iterator<Item = String> {
     all.into_iter().filter(|&(count, _)| count > 0).map(|(count, what)| format!("{count} {what}"))
 }
 
-/// What a mesh has, and has no more when the file is read again: the file decides, not what is known of its format.
-fn lost(format: Format, before: &Soup, file: &[u8]) -> Vec<String> {
-    let Ok((after, _)) = format::read(format, file, &Watch::silent()) else { return Vec::new() };
-    let mut lost = Vec::new();
-    if after.faces.len() < before.faces.len() {
-        lost.push(format!("{} faces", before.faces.len() - after.faces.len()));
+/// What the file does not hold of the mesh.
+fn not_kept(format: Format, before: &Soup, file: &[u8]) -> Vec<String> {
+    match format::read(format, file, &Watch::silent()) {
+        Ok((after, _)) => format::not_kept(before, &after),
+        Err(error) => vec![format!("all of it; it cannot be read back: {error}")],
     }
-    for ((what, before), (_, after)) in holdings(before).into_iter().zip(holdings(&after)) {
-        let count = |all: &[(String, usize)]| all.iter().map(|&(_, members)| members).sum::<usize>();
-        if after.len() < before.len() {
-            let known: BTreeSet<&String> = after.iter().map(|(name, _)| name).collect();
-            let gone = before.iter().filter(|(name, _)| !known.contains(name));
-            let names: Vec<&str> = gone.map(|(name, _)| name.as_str()).collect();
-            lost.push(format!("{what} {}", shortened(&names)));
-        } else if count(&after) < count(&before) {
-            lost.push(format!("{what}: {} of {} memberships", count(&before) - count(&after), count(&before)));
-        }
-    }
-    lost
-}
-
-/// Names and sizes of all that a mesh carries and a file may hold, by kind.
-fn holdings(soup: &Soup) -> [(&'static str, Vec<(String, usize)>); 5] {
-    let carried = &soup.carried;
-    let regions = carried.regions.iter().flat_map(|regions| {
-        let mut sizes = vec![0; regions.names.len()];
-        for &label in regions.labels.as_slice() {
-            if let Some(size) = sizes.get_mut(label as usize) {
-                *size += 1;
-            }
-        }
-        regions.names.iter().cloned().zip(sizes)
-    });
-    let groups = |kind: &str| {
-        let own = carried.groups.list().filter(move |&(k, ..)| k == kind);
-        own.map(|(_, name, size)| (name.to_owned(), size)).collect::<Vec<_>>()
-    };
-    let fields = |support: Support| {
-        let own = carried.fields.iter().filter(move |field| field.support == support);
-        own.map(|field| (field.name.clone(), field.components)).collect()
-    };
-    [
-        ("groups of faces", groups("faces").into_iter().chain(regions).collect()),
-        ("groups of edges", groups("edges")),
-        ("groups of vertices", groups("vertices")),
-        ("fields on vertices", fields(Support::Vertex)),
-        ("fields on faces", fields(Support::Face)),
-    ]
-}
-
-/// Some names in a line.
-fn shortened(names: &[&str]) -> String {
-    const MOST: usize = 5;
-    let shown: Vec<String> = names.iter().take(MOST).map(|name| format!("`{}`", printable(name))).collect();
-    let more = if names.len() > MOST { format!(" and {} more", names.len() - MOST) } else { String::new() };
-    shown.join(", ") + &more
-}
-
-/// A name from a file, fit for a terminal: control characters, which could steer it, as escapes.
-fn printable(name: &str) -> String {
-    name.chars().flat_map(|c| if c.is_control() { c.escape_default().collect() } else { vec![c] }).collect()
 }
 
 /// Reads a mesh file of any format.

@@ -12,6 +12,7 @@ mod element;
 mod error;
 mod group_text;
 mod inp;
+mod kept;
 mod mixed;
 mod msh;
 mod obj;
@@ -29,6 +30,7 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 pub use error::{FormatError, Place, Reason};
+pub use kept::{groups_not_kept, not_kept};
 pub use sets::welded_seams;
 
 use crate::mesh::Soup;

@@ -10,7 +10,7 @@ mod column;
 mod evaluate;
 mod fault;
 
-pub use evaluate::{GateError, evaluate, judges_faces};
+pub use evaluate::{GateError, bounds_distance, evaluate, judges_faces};
 
 /// A bound of a check, as the recipe gives it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -44,6 +44,10 @@ pub struct Check {
     pub reference: Option<String>,
     /// Face groups that are not judged.
     pub except: Vec<String>,
+    /// Files written of the mesh must hold it too, read back: `groups-kept` alone asks for that, for what is measured on
+    /// a mesh is judged on its files anyway.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub files: bool,
 }
 
 /// An element that fails a check.

@@ -12,7 +12,8 @@ use crate::recipe::{Diagnostic, Entry, Node, Table, Tree};
 use crate::step::Port;
 
 /// The keys of a check.
-pub const CHECK_KEYS: [&str; 8] = ["at-least", "at-most", "equals", "to", "of", "same-as", "no-more-than", "except"];
+pub const CHECK_KEYS: [&str; 9] =
+    ["at-least", "at-most", "equals", "to", "of", "same-as", "no-more-than", "except", "files"];
 
 /// A gate whose step and checks are known.
 pub(super) struct GateDecl {
@@ -124,6 +125,7 @@ fn limits(
                 "at-most" => check.at_most = limit(metric, key, &entry.value, context),
                 "equals" => check.equals = limit(metric, key, &entry.value, context),
                 "except" => check.except = groups(&entry.value, context),
+                "files" => check.files = files(metric, &entry.value, context),
                 "to" | "of" | "same-as" | "no-more-than" => {
                     check.same_as_reference |= key == "same-as";
                     check.no_more_than_reference |= key == "no-more-than";
@@ -149,6 +151,22 @@ fn limits(
         }
     }
     (check, reference)
+}
+
+/// Whether the files written of the mesh must hold it as well.
+fn files(metric: &MetricDef, value: &Tree, context: &mut CaseContext<'_>) -> bool {
+    match &value.value {
+        Node::Bool(wanted) if metric.name == "groups-kept" => return *wanted,
+        Node::Bool(_) => {
+            let message = format!("`files` is for `groups-kept`; `{}` is judged on files as on the mesh", metric.name);
+            context.problems.push(Diagnostic::error(value.span, message).help("leave it out"));
+        }
+        other => {
+            let message = format!("`files` is true or false, got {}", other.kind());
+            context.problems.push(Diagnostic::error(value.span, message));
+        }
+    }
+    false
 }
 
 /// A number without a word means equality, which no measured length or ratio ever has, and is never what was meant.

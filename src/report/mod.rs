@@ -135,6 +135,12 @@ pub struct FileReport {
     pub content: Option<String>,
     /// Whether it shows a result whose gate failed.
     pub failed_gate: bool,
+    /// What the mesh has and the file has not: groups and fields that its format cannot hold, faces lost to rounding.
+    #[serde(default)]
+    pub lost: Vec<String>,
+    /// What else there is to say of it: that it was written as text to keep a gate, by how much rounding moved it.
+    #[serde(default)]
+    pub note: Option<String>,
     /// Why it could not be written.
     pub failure: Option<StepFailure>,
 }
@@ -282,6 +288,8 @@ impl CaseReport {
             step: file.step.clone(),
             content: file.content.map(|hash| hash.to_hex().to_string()),
             failed_gate: file.failed_gate,
+            lost: file.notes.lost.clone(),
+            note: file.notes.note.clone(),
             failure: file.failure.clone(),
         });
         Self {

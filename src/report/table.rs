@@ -93,7 +93,10 @@ fn files(case: &CaseReport, report: &Report) -> String {
             (Some(FileState::Written), _) => "written",
             (Some(FileState::Missing) | None, _) => "not written",
         };
-        table.add_row([file.path.as_str(), file.step.as_str(), state]);
+        let lost = (!file.lost.is_empty()).then(|| format!("without {}", file.lost.join(", ")));
+        let said: Vec<String> = file.note.iter().cloned().chain(lost).collect();
+        let said = if said.is_empty() { String::new() } else { format!(" ({})", said.join("; ")) };
+        table.add_row([file.path.as_str(), file.step.as_str(), &format!("{state}{said}")]);
     }
     text(&table)
 }

@@ -5,6 +5,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::time::Instant;
 
+use super::certify::FileNotes;
 use super::figures::figures;
 use super::observe::{Event, Observer};
 use super::shared::{NoArtifact, Shared, VERSION, recipe_task};
@@ -30,7 +31,7 @@ pub(super) enum Finished {
     /// The task's result is stored.
     Task(Box<Entry>),
     /// The file is right.
-    File(FileState, ContentHash),
+    File(FileState, ContentHash, FileNotes),
     /// There is nothing to write.
     Nothing,
     /// The artifact of this input is gone: make it again, then run this job again.
@@ -78,7 +79,7 @@ pub(super) fn run(shared: &Shared<'_>, index: usize, node: Node, observer: Arc<d
     let watch = Watch::new(progress, Arc::clone(&shared.options.cancelled));
     let work = || match node {
         Node::Task(id) => task(shared, id, &watch),
-        Node::File(case, position) => output::file(shared, case, position),
+        Node::File(case, position) => output::file(shared, case, position, &watch),
         Node::Faults(case, position) => output::faults(shared, case, position),
     };
     catch_unwind(AssertUnwindSafe(work))

@@ -18,6 +18,7 @@
 //! sweep finish one after the other and few artifacts are alive.
 
 pub mod board;
+mod certify;
 mod claim;
 mod figures;
 mod gate;
@@ -39,6 +40,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 pub use board::TaskState;
+pub use certify::FileNotes;
 pub use claim::{Claim, claim};
 pub use guard::{is_inside, replaced};
 pub use observe::{Event, Observer, Silent};

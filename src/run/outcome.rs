@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use super::board::TaskState;
+use super::certify::FileNotes;
 use crate::metric::gate::GateReport;
 use crate::plan::{ContentHash, Key, Plan, TaskId};
 use crate::step::{FailureKind, StepFailure};
@@ -40,7 +41,7 @@ impl TaskOutcome {
 }
 
 /// What became of an output file.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum FileState {
     /// It was right already.
@@ -48,6 +49,7 @@ pub enum FileState {
     /// It was written.
     Written,
     /// Not written, because its step or a gate could not be decided, or the run ended.
+    #[default]
     Missing,
 }
 
@@ -68,6 +70,8 @@ pub struct FileOutcome {
     pub content: Option<ContentHash>,
     /// Whether it shows what failed a gate, below `failed/`.
     pub failed_gate: bool,
+    /// What it does not hold of its mesh, and how it was written.
+    pub notes: FileNotes,
     /// Why it could not be made.
     pub failure: Option<StepFailure>,
 }

@@ -8,9 +8,11 @@
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use glam::DVec3;
 
+use super::certify::{FileNotes, certified};
 use super::job::{Finished, Node};
 use super::shared::{Shared, VERSION, recipe_task};
 use super::{FileState, RunError, whole};
@@ -21,6 +23,7 @@ use crate::metric::gate::{FaultKind, GateReport};
 use crate::plan::{ContentHash, Gate, Output, OutputOptions, TaskId};
 use crate::step::{Artifact, StepFailure};
 use crate::store::{Entry, Outcome};
+use crate::watch::Watch;
 
 /// Where an output of a case belongs, and whether its gates hold. `None` while a gate is undecided.
 pub(super) fn place(shared: &Shared<'_>, case: usize, output: &Output) -> Option<(PathBuf, bool)> {
@@ -54,9 +57,10 @@ pub(super) fn settled(shared: &Shared<'_>, node: Node) -> Option<Finished> {
             }
             let midside = output.options.midside_on.map(|task| shared.content(task));
             let midside = if let Some(midside) = midside { Some(midside?) } else { None };
-            let key = file_key(shared.content(output.task)?, midside, &output.options, &output.file);
-            let current = current(shared, &key, &path).ok()?;
-            Some(Finished::File(FileState::Current, current))
+            let promises = promises(shared, case, output);
+            let key = file_key(shared.content(output.task)?, midside, &promises, output);
+            let (current, notes) = current(shared, &key, &path).ok()?;
+            Some(Finished::File(FileState::Current, current, notes))
         }
         Node::Faults(case, position) => {
             let gate = &shared.plan.cases()[case].gates[position];
@@ -68,18 +72,30 @@ pub(super) fn settled(shared: &Shared<'_>, node: Node) -> Option<Finished> {
     }
 }
 
-/// The hash of a file that is right already; else its hash as it is, where it is there.
-fn current(shared: &Shared<'_>, key: &ContentHash, path: &Path) -> Result<ContentHash, Option<ContentHash>> {
+/// The hash of a file that is right already, with what is known of it; else its hash as it is, where it is there.
+fn current(
+    shared: &Shared<'_>,
+    key: &ContentHash,
+    path: &Path,
+) -> Result<(ContentHash, FileNotes), Option<ContentHash>> {
     let current = if path.is_file() { shared.index.hash(path).ok() } else { None };
     let Some(hash) = current else { return Err(None) };
-    match shared.store.entry(key).map(|entry| entry.outcome) {
-        Some(Outcome::File { content, .. }) if content == hash => Ok(hash),
+    match shared.store.entry(key) {
+        Some(Entry { outcome: Outcome::File { content, .. }, stats, .. }) if content == hash => {
+            Ok((hash, serde_json::from_value(stats).unwrap_or_default()))
+        }
         _ => Err(current),
     }
 }
 
+/// Keys of the gates that speak of an output: how it is written depends on them.
+fn promises(shared: &Shared<'_>, case: usize, output: &Output) -> Vec<ContentHash> {
+    let gates = shared.plan.cases()[case].gates.iter().filter(|gate| gate.target == output.task);
+    gates.flat_map(|gate| &gate.tasks).filter_map(|task| Some(shared.key(*task)?.0)).collect()
+}
+
 /// Sees to one output file.
-pub(super) fn file(shared: &Shared<'_>, case: usize, position: usize) -> Result<Finished, Finished> {
+pub(super) fn file(shared: &Shared<'_>, case: usize, position: usize, watch: &Watch) -> Result<Finished, Finished> {
     let output = &shared.plan.cases()[case].outputs[position];
     let Some((path, passed)) = place(shared, case, output) else { return Ok(Finished::Nothing) };
     let folder = shared.folder(case);
@@ -87,11 +103,17 @@ pub(super) fn file(shared: &Shared<'_>, case: usize, position: usize) -> Result<
     remove(&other)?;
     let content = known(shared, output.task)?;
     let midside = output.options.midside_on.map(|task| known(shared, task)).transpose()?;
-    let key = file_key(content, midside, &output.options, &output.file);
+    let key = file_key(content, midside, &promises(shared, case, output), output);
     settle(shared, &key, &path, &output.step, || {
         let artifact = shared.artifact(output.task)?;
         let midside = output.options.midside_on.map(|task| shared.artifact(task)).transpose()?;
-        encode(&artifact, midside.as_ref(), &output.options, &output.file, content).map_err(Finished::Failed)
+        let name = output.file.file_name().unwrap_or_default().to_string_lossy();
+        if let (Artifact::Patches(patches), true) = (&artifact, name.to_ascii_lowercase().ends_with(".json")) {
+            return Ok((super::patches::json(patches, &header(content)), FileNotes::default()));
+        }
+        let encoder = Encoder::new(&artifact, midside.as_ref(), output, &name, content).map_err(Finished::Failed)?;
+        let write = |binary: bool| encoder.encode(binary);
+        certified((shared, case, output), (encoder.format, &encoder.soup), &write, watch)
     })
 }
 
@@ -116,7 +138,9 @@ pub(super) fn faults(shared: &Shared<'_>, case: usize, position: usize) -> Resul
         let options = WriteOptions { binary: true, header: header(content), ..WriteOptions::default() };
         let format = Format::from_file_name("failed.vtu");
         let format = format.ok_or_else(|| Finished::Failed(StepFailure::failed("there is no writer for VTU")))?;
-        format::write(format, &soup, &options).map_err(|error| Finished::Failed(StepFailure::failed(error.to_string())))
+        let bytes = format::write(format, &soup, &options);
+        let bytes = bytes.map_err(|error| Finished::Failed(StepFailure::failed(error.to_string())))?;
+        Ok((bytes, FileNotes::default()))
     })
 }
 
@@ -126,13 +150,13 @@ fn settle(
     key: &ContentHash,
     path: &Path,
     step: &str,
-    make: impl FnOnce() -> Result<Vec<u8>, Finished>,
+    make: impl FnOnce() -> Result<(Vec<u8>, FileNotes), Finished>,
 ) -> Result<Finished, Finished> {
     let current = match current(shared, key, path) {
-        Ok(right) => return Ok(Finished::File(FileState::Current, right)),
+        Ok((right, notes)) => return Ok(Finished::File(FileState::Current, right, notes)),
         Err(current) => current,
     };
-    let bytes = make()?;
+    let (bytes, notes) = make()?;
     let content = blake3::hash(&bytes);
     if current != Some(content) {
         whole::write(path, &bytes).map_err(broken("write", path))?;
@@ -142,14 +166,14 @@ fn settle(
     if shared.store.entry(key).is_none_or(|known| known.outcome != outcome) {
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         let task = recipe_task(&shared.options.name, &format!("{step} -> {name}"));
-        shared.publish(key, &file_entry(task, outcome));
+        shared.publish(key, &file_entry(task, outcome, &notes));
     }
     let state = if current == Some(content) { FileState::Current } else { FileState::Written };
-    Ok(Finished::File(state, content))
+    Ok(Finished::File(state, content, notes))
 }
 
-fn file_entry(task: String, outcome: Outcome) -> Entry {
-    let stats = serde_json::Value::Null;
+fn file_entry(task: String, outcome: Outcome, notes: &FileNotes) -> Entry {
+    let stats = serde_json::to_value(notes).unwrap_or_default();
     Entry { version: VERSION.to_owned(), task, record: Vec::new(), outcome, stats, seconds: 0.0 }
 }
 
@@ -174,14 +198,22 @@ fn part(hasher: &mut blake3::Hasher, bytes: &[u8]) {
     hasher.update(bytes);
 }
 
-fn file_key(content: ContentHash, midside: Option<ContentHash>, options: &OutputOptions, file: &Path) -> ContentHash {
-    let OutputOptions { element, midside_on: _, binary, precision, first_id } = options;
-    let ending = file.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+fn file_key(
+    content: ContentHash,
+    midside: Option<ContentHash>,
+    promises: &[ContentHash],
+    output: &Output,
+) -> ContentHash {
+    let OutputOptions { element, midside_on: _, binary, precision, first_id } = &output.options;
+    let ending = output.file.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
     let mut hasher = blake3::Hasher::new();
     part(&mut hasher, b"file");
     part(&mut hasher, VERSION.as_bytes());
     part(&mut hasher, content.as_bytes());
     part(&mut hasher, midside.as_ref().map_or(&[], |hash| hash.as_bytes()));
+    for promise in promises {
+        part(&mut hasher, promise.as_bytes());
+    }
     part(&mut hasher, ending.as_bytes());
     part(&mut hasher, format!("{element:?} {binary:?} {precision:?} {first_id:?}").as_bytes());
     hasher.finalize()
@@ -191,37 +223,56 @@ fn header(content: ContentHash) -> String {
     format!("meshmill {VERSION} {}", content.to_hex())
 }
 
-/// The bytes of an output file.
-fn encode(
-    artifact: &Artifact,
-    midside: Option<&Artifact>,
-    options: &OutputOptions,
-    file: &Path,
+/// Makes the bytes of an output file.
+struct Encoder<'a> {
+    format: Format,
+    soup: Arc<Soup>,
+    element: Option<Element>,
+    /// The surface on which mid-side nodes lie.
+    midside: Option<TriangleBvh>,
+    options: &'a OutputOptions,
+    name: &'a str,
     content: ContentHash,
-) -> Result<Vec<u8>, StepFailure> {
-    let name = file.file_name().unwrap_or_default().to_string_lossy();
-    if let (Artifact::Patches(patches), true) = (artifact, name.to_ascii_lowercase().ends_with(".json")) {
-        return Ok(super::patches::json(patches, &header(content)));
+}
+
+impl<'a> Encoder<'a> {
+    fn new(
+        artifact: &Artifact,
+        midside: Option<&Artifact>,
+        output: &'a Output,
+        name: &'a str,
+        content: ContentHash,
+    ) -> Result<Self, StepFailure> {
+        let no_mesh = || StepFailure::failed(format!("a {} is not a mesh", artifact.port()));
+        let tree = |artifact: &Artifact| artifact.as_surface().map(|surface| TriangleBvh::of_surface(surface));
+        Ok(Self {
+            format: Format::from_file_name(name).ok_or_else(|| unknown_ending(name))?,
+            soup: artifact.to_soup().ok_or_else(no_mesh)?,
+            element: output.options.element.as_deref().map(element).transpose()?,
+            midside: midside.map(tree).transpose()?,
+            options: &output.options,
+            name,
+            content,
+        })
     }
-    let format = Format::from_file_name(&name).ok_or_else(|| unknown_ending(&name))?;
-    let soup = artifact.to_soup().ok_or_else(|| StepFailure::failed(format!("a {} is not a mesh", artifact.port())))?;
-    let element = options.element.as_deref().map(element).transpose()?;
-    let tree =
-        midside.map(|artifact| artifact.as_surface().map(|surface| TriangleBvh::of_surface(surface))).transpose()?;
-    let project = tree.map(|tree| move |p: DVec3| tree.closest(p).map_or(p, |closest| closest.nearest.point));
-    let options = WriteOptions {
-        element,
-        midside: project.as_ref().map(|project| project as &(dyn Fn(DVec3) -> DVec3 + Sync)),
-        binary: options.binary.unwrap_or(format.is_binary_by_default()),
-        precision: options.precision.map(|digits| digits as usize),
-        first_id: options.first_id,
-        header: header(content),
-    };
-    format::write(format, &soup, &options).map_err(|error| {
-        let remedy = error.remedy.clone();
-        let failure = StepFailure::failed(format!("cannot write {name}: {error}"));
-        if let Some(remedy) = remedy { failure.with_help(remedy) } else { failure }
-    })
+
+    fn encode(&self, binary: bool) -> Result<Vec<u8>, StepFailure> {
+        let tree = self.midside.as_ref();
+        let project = tree.map(|tree| move |p: DVec3| tree.closest(p).map_or(p, |closest| closest.nearest.point));
+        let options = WriteOptions {
+            element: self.element,
+            midside: project.as_ref().map(|project| project as &(dyn Fn(DVec3) -> DVec3 + Sync)),
+            binary,
+            precision: self.options.precision.map(|digits| digits as usize),
+            first_id: self.options.first_id,
+            header: header(self.content),
+        };
+        format::write(self.format, &self.soup, &options).map_err(|error| {
+            let remedy = error.remedy.clone();
+            let failure = StepFailure::failed(format!("cannot write {}: {error}", self.name));
+            if let Some(remedy) = remedy { failure.with_help(remedy) } else { failure }
+        })
+    }
 }
 
 fn element(name: &str) -> Result<Element, StepFailure> {

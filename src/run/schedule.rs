@@ -8,6 +8,7 @@ use std::thread;
 use std::time::Instant;
 
 use super::board::{Board, TaskState};
+use super::certify::FileNotes;
 use super::job::{self, Finished, Node};
 use super::observe::Observer;
 use super::outcome::{FileOutcome, FileState, RunOutcome, TaskOutcome};
@@ -65,6 +66,15 @@ fn folders(shared: &Shared<'_>) -> BTreeSet<PathBuf> {
     folders
 }
 
+/// What became of a file.
+#[derive(Default)]
+struct Filed {
+    state: FileState,
+    content: Option<blake3::Hash>,
+    notes: FileNotes,
+    failure: Option<StepFailure>,
+}
+
 struct Schedule<'a> {
     shared: &'a Shared<'a>,
     nodes: Vec<Node>,
@@ -73,7 +83,7 @@ struct Schedule<'a> {
     /// Entries of forced tasks from before this run.
     before: BTreeMap<TaskId, Entry>,
     forced: BTreeSet<TaskId>,
-    files: BTreeMap<usize, (FileState, Option<blake3::Hash>, Option<StepFailure>)>,
+    files: BTreeMap<usize, Filed>,
     /// By rank: the first task of the plan first, and a file right after the last task that it waits for, so that a
     /// case is finished and forgotten before the next one fills the memory.
     ready: BTreeSet<(usize, usize)>,
@@ -327,8 +337,8 @@ impl<'a> Schedule<'a> {
                 }
                 self.set(node, TaskState::Done, Some(&entry));
             }
-            Finished::File(state, content) => {
-                self.files.insert(node, (state, Some(content), None));
+            Finished::File(state, content, notes) => {
+                self.files.insert(node, Filed { state, content: Some(content), notes, failure: None });
                 let state = if state == FileState::Written { TaskState::Done } else { TaskState::Cached };
                 self.set(node, state, None);
             }
@@ -349,7 +359,7 @@ impl<'a> Schedule<'a> {
                 match self.nodes[node] {
                     Node::Task(id) => self.tasks[id.index()].failure = Some(failure),
                     Node::File(..) | Node::Faults(..) => {
-                        self.files.insert(node, (FileState::Missing, None, Some(failure)));
+                        self.files.insert(node, Filed { failure: Some(failure), ..Filed::default() });
                     }
                 }
                 self.set(node, TaskState::Failed, None);
@@ -371,7 +381,7 @@ impl<'a> Schedule<'a> {
     fn into_outcome(mut self, seconds: f64) -> RunOutcome {
         let mut files = Vec::new();
         for (node, what) in self.nodes.iter().enumerate() {
-            let (state, content, failure) = self.files.remove(&node).unwrap_or((FileState::Missing, None, None));
+            let Filed { state, content, notes, failure } = self.files.remove(&node).unwrap_or_default();
             match *what {
                 Node::Task(_) => {}
                 Node::File(case, position) => {
@@ -379,7 +389,17 @@ impl<'a> Schedule<'a> {
                     let fallback = || (self.shared.folder(case).join(&output.file), true);
                     let (path, passed) = output::place(self.shared, case, output).unwrap_or_else(fallback);
                     let (step, task) = (output.step.clone(), output.task);
-                    files.push(FileOutcome { case, step, task, path, state, content, failed_gate: !passed, failure });
+                    files.push(FileOutcome {
+                        case,
+                        step,
+                        task,
+                        path,
+                        state,
+                        content,
+                        failed_gate: !passed,
+                        notes,
+                        failure,
+                    });
                 }
                 Node::Faults(case, position) => {
                     if content.is_none() && failure.is_none() {
@@ -388,7 +408,17 @@ impl<'a> Schedule<'a> {
                     let gate = &self.shared.plan.cases()[case].gates[position];
                     let path = output::faults_place(self.shared, case, position);
                     let (step, task) = (gate.step.clone(), gate.target);
-                    files.push(FileOutcome { case, step, task, path, state, content, failed_gate: true, failure });
+                    files.push(FileOutcome {
+                        case,
+                        step,
+                        task,
+                        path,
+                        state,
+                        content,
+                        failed_gate: true,
+                        notes,
+                        failure,
+                    });
                 }
             }
         }

@@ -187,7 +187,9 @@ fn metrics(page: &mut String) {
         "\n## Metrics\n\n\
          A gate checks any of them: `min-stretch = { at-least = 0.2 }`, `distance = { to = \"STEP\", at-most = \"0.2%\" }`, \
          `closed = true`, `euler-characteristic = { same-as = \"STEP\" }`, `groups-kept = { of = \"STEP\" }`, \
-         `self-intersections = { no-more-than = \"STEP\" }`; `except` names face groups that are not judged.\n\n\
+         `self-intersections = { no-more-than = \"STEP\" }`; `except` names face groups that are not judged. \
+         Every file is read back before it is written, and what rounding moved is judged again; \
+         `groups-kept = { of = \"STEP\", files = true }` asks the files for their groups as well.\n\n\
          | metric | unit | measured on | meaning |\n|---|---|---|---|\n",
     );
     for metric in METRICS.iter() {

@@ -254,6 +254,11 @@ fn sides(metric: &str) -> Option<[bool; 2]> {
     }
 }
 
+/// Whether a check bounds a distance from above, so that vertices that move by less than its slack cannot break it.
+pub fn bounds_distance(check: &Check) -> bool {
+    check.at_most.is_some() && check.at_least.is_none() && check.equals.is_none() && sides(&check.metric).is_some()
+}
+
 /// Whether a check judges faces one by one, so that `except` can leave some out.
 pub fn judges_faces(check: &Check) -> bool {
     let nothing = Soup::default();
