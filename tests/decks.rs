@@ -112,3 +112,66 @@ fn cards_about_the_analysis_are_passed_over() {
         "*MATERIAL, NAME=steel\n*ELASTIC\n210000, 0.3\n*STEP\n*STATIC\n*CLOAD\n1, 3, 1.0\n*NODE FILE\nU\n*END STEP\n";
     assert_eq!(points(Format::Inp, &format!("{SQUARE}{cards}")).unwrap().len(), 4);
 }
+
+/// The square with these cards after it: its groups of faces, and what was left out.
+fn groups(cards: &str) -> (Vec<String>, Vec<String>) {
+    let deck = format!("{SQUARE}*ELSET, ELSET=skin\n1\n{cards}");
+    let (soup, counts) = read(Format::Inp, deck.as_bytes(), &Watch::silent()).expect("a square");
+    assert_eq!((soup.points.len(), soup.faces.len()), (4, 1));
+    (soup.carried.groups.faces.keys().cloned().collect(), counts.left_out())
+}
+
+#[test]
+fn a_set_or_surface_that_is_not_understood_is_left_out_and_named() {
+    for (card, left_out) in [
+        ("*SURFACE, NAME=s, COMBINE=UNION\nskin, other\n", "surface `s` (line 10): COMBINE=UNION"),
+        ("*SURFACE, NAME=s, COMBINE=DIFFERENCE\nskin\n", "surface `s` (line 10): COMBINE=DIFFERENCE"),
+        ("*SURFACE, NAME=s\n,\n", "surface `s` (line 10): all free faces of the model"),
+        ("*SURFACE, NAME=s, TYPE=ELEMENT\nskin,\n, SPOS\n", "surface `s` (line 10): all free faces of the model"),
+        ("*SURFACE, NAME=s, TYPE=CYLINDER\nSTART, 0., 0.\nLINE, 1., 0.\n", "surface `s` (line 10): TYPE=CYLINDER"),
+        ("*SURFACE, TYPE=revolution, NAME=s\nSTART, 0., 0.\n", "surface `s` (line 10): TYPE=REVOLUTION"),
+        ("*SURFACE, NAME=s\nskin, EDGE\n", "surface `s` (line 10): side `EDGE`"),
+        ("*SURFACE, NAME=s\nrest, SPOS\n", "surface `s` (line 10): no set `rest` could be read from the file"),
+        ("*ELSET, ELSET=s\nskin, rest\n", "element set `s` (line 10): no set `rest` could be read from the file"),
+        ("*ELSET, ELSET=s, GENERATE\none, 2\n", "element set `s` (line 10): expected a range of numbers, found \"one\""),
+        ("*NSET, NSET=s, INSTANCE=I\n1\n", "node set `s` (line 10): no instance `I` is defined above"),
+        ("*NSET\n1\n", "node set `` (line 10): it has no name"),
+        ("*NSET, NSET=s, ELSET=skin\n", "node set `s` (line 10): ELSET=skin"),
+    ] {
+        assert_eq!(groups(card), (vec!["skin".to_owned()], vec![left_out.to_owned()]), "{card}");
+    }
+}
+
+#[test]
+fn numbers_that_nobody_has_are_left_out_of_their_set_and_counted() {
+    let (names, left_out) = groups("*ELSET, ELSET=more\n1, 7, 8\n");
+    assert_eq!((names.len(), left_out.len()), (2, 1));
+    assert_eq!(left_out, ["2 members of element set `more` (line 10), which the file does not have"]);
+}
+
+#[test]
+fn names_in_notes_cannot_steer_a_terminal() {
+    let (_, left_out) = groups("*SURFACE, NAME=a\u{1b}[2Jb, COMBINE=UNION\nskin\n");
+    assert_eq!(left_out, ["surface `a\\u{1b}[2Jb` (line 10): COMBINE=UNION"]);
+}
+
+#[test]
+fn notes_are_counted_when_there_are_many() {
+    let cards = "*SURFACE, NAME=s, COMBINE=UNION\n".repeat(1000);
+    let (_, left_out) = groups(&cards);
+    assert_eq!((left_out.len(), left_out.last().unwrap().as_str()), (41, "960 more things of this kind"));
+}
+
+#[test]
+fn an_element_takes_neither_more_nor_fewer_nodes_than_its_type_has() {
+    let deck = |elements: &str| format!("{}{elements}", &SQUARE[..SQUARE.len() - "1, 1, 2, 3, 4\n".len()]);
+    for (elements, line) in [("1, 1, 2, 3, 4, 2\n", 7), ("1, 1, 2, 3\n2, 2, 3, 4, 1\n", 8)] {
+        let error = points(Format::Inp, &deck(elements)).unwrap_err();
+        assert!(error.contains(&format!("line {line}: expected the end of the element")), "{error}");
+    }
+    for elements in ["1, 1, 2, 3, 4,\n", "1, 1, 2,\n3, 4\n", "1, 1, 2, 3, 4, ,\n"] {
+        assert_eq!(points(Format::Inp, &deck(elements)).unwrap().len(), 4);
+    }
+    let beam = format!("{SQUARE}*ELEMENT, TYPE=B31\n2, 1, 2, 4\n");
+    assert_eq!(points(Format::Inp, &beam).unwrap().len(), 4, "a beam may name a node for its orientation");
+}

@@ -5,6 +5,8 @@
 mod formats {
     mod corpus;
     mod damage;
+    mod gmsh;
     mod parts;
     mod round_trip;
+    mod tables;
 }

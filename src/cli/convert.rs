@@ -37,7 +37,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Fault> {
     })?;
     write_named(&arguments.to, &bytes)?;
     say(&format!("{}: {} vertices, {} faces", arguments.to.display(), soup.points.len(), soup.faces.len()));
-    for what in left_out(counts) {
+    for what in counts.left_out() {
         say(&format!("  left out on reading: {what}"));
     }
     let lost = not_kept(format, &soup, &bytes);
@@ -54,17 +54,6 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Fault> {
     Ok(Exit::Done)
 }
 
-/// What a reader left out, with numbers.
-fn left_out(counts: ReadCounts) -> impl Iterator<Item = String> {
-    let all = [
-        (counts.faces_dropped, "faces with fewer than three corners"),
-        (counts.fields_dropped, "fields without finite numbers"),
-        (counts.elements_dropped, "elements that are no faces"),
-        (counts.nodes_dropped, "nodes of these, and between corners"),
-    ];
-    all.into_iter().filter(|&(count, _)| count > 0).map(|(count, what)| format!("{count} {what}"))
-}
-
 /// What the file does not hold of the mesh.
 fn not_kept(format: Format, before: &Soup, file: &[u8]) -> Vec<String> {
     match format::read(format, file, &Watch::silent()) {
@@ -73,9 +62,13 @@ fn not_kept(format: Format, before: &Soup, file: &[u8]) -> Vec<String> {
     }
 }
 
-/// Reads a mesh file of any format.
+/// Reads a mesh file of any format; says what was left out of it.
 pub(super) fn read_mesh(path: &Path) -> Result<Soup, Fault> {
-    read_with_counts(path).map(|(soup, _)| soup)
+    let (soup, counts) = read_with_counts(path)?;
+    for what in counts.left_out() {
+        say(&format!("{}: left out on reading: {what}", path.display()));
+    }
+    Ok(soup)
 }
 
 fn read_with_counts(path: &Path) -> Result<(Soup, ReadCounts), Fault> {

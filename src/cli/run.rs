@@ -97,7 +97,7 @@ pub(super) fn once(arguments: &Arguments, global: &Global, interrupt: &Interrupt
     }
     if let (Some(unchanged), Status::Done, true) = (unchanged, report.status, saved) {
         let out = if global.quiet { String::new() } else { table::report(&report.unchanged()) };
-        let said = Said { out, err: Vec::new(), exit: 0 };
+        let said = Said { out, err: left_out(&report), exit: 0 };
         unchanged.remember(&store, (seen, report.written().collect()), said, &report, &options.out)?;
     }
     Ok(report.status.into())
@@ -240,6 +240,9 @@ pub(super) fn tell(report: &Report, json: bool, quiet: bool) -> Result<(), Fault
     } else if !quiet {
         data(&coloured(&table::report(report)));
     }
+    for line in left_out(report) {
+        say(&line);
+    }
     for (name, failure) in report.failures() {
         say_failure(name, failure);
     }
@@ -257,6 +260,16 @@ pub(super) fn tell(report: &Report, json: bool, quiet: bool) -> Result<(), Fault
         Status::Done | Status::Differs | Status::BadInput | Status::StepFailed => {}
     }
     Ok(())
+}
+
+/// What readers left out of the files that they read, each once, however many cases read them.
+pub(super) fn left_out(report: &Report) -> Vec<String> {
+    let steps = report.cases.iter().flat_map(|case| &case.steps);
+    let lines: BTreeSet<String> = steps
+        .filter_map(|step| Some((&step.name, step.stats.as_ref()?.get("left-out")?.as_array()?)))
+        .flat_map(|(name, all)| all.iter().filter_map(move |what| Some(format!("{name}: left out on reading: {}", what.as_str()?))))
+        .collect();
+    lines.into_iter().collect()
 }
 
 /// Which checks did not hold.

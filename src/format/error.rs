@@ -25,6 +25,12 @@ pub enum Reason {
         /// What the file ends in, such as `a facet`.
         within: &'static str,
     },
+    /// A line of a table has too few values.
+    #[error("the line ends inside {within}")]
+    TooFew {
+        /// What the line ends in, such as `a vertex`.
+        within: &'static str,
+    },
     /// A count promises more than the file can hold.
     #[error("{count} {what} are announced, but the rest of the file can hold at most {room}")]
     Untrue {

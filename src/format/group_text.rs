@@ -65,7 +65,7 @@ fn push_range(out: &mut Vec<u8>, position: usize, first: u32, last: u32) {
     }
 }
 
-/// Reads the group lines from here to the end and skips all others. Face `i` of the file is faces
+/// Reads the group lines from here to the end and skips other comments. Face `i` of the file is faces
 /// `first_of[i]..first_of[i + 1]` of the soup.
 pub(super) fn read_groups(
     builder: &mut Builder,
@@ -77,6 +77,9 @@ pub(super) fn read_groups(
     while let Some(word) = scanner.word() {
         if word == MARK {
             reader.read(&mut scanner)?;
+        } else if !word.starts_with(b"#") {
+            return Err(FormatError::unexpected(scanner.place(), "the end of the file", word)
+                .with_remedy("the file has more lines than the head announces: export it again"));
         }
         scanner.next_line();
     }

@@ -7,6 +7,7 @@
 mod bdf;
 mod binary;
 mod builder;
+mod counts;
 mod csv;
 mod element;
 mod error;
@@ -29,6 +30,7 @@ mod weld;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
+pub use counts::ReadCounts;
 pub use error::{FormatError, Place, Reason};
 pub use kept::{groups_not_kept, not_kept};
 pub use sets::welded_seams;
@@ -78,23 +80,6 @@ struct FormatDef {
     sniff: fn(&[u8]) -> bool,
     read: fn(&[u8], &Watch) -> ReadResult,
     write: fn(&Soup, &WriteOptions<'_>) -> Result<Vec<u8>, FormatError>,
-}
-
-/// What a reader did besides reading.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct ReadCounts {
-    /// Polygons with more than four corners, cut into triangles.
-    pub polygons_triangulated: usize,
-    /// Faces with fewer than three corners, left out.
-    pub faces_dropped: usize,
-    /// Fields with a number that is NaN or infinite, left out.
-    pub fields_dropped: usize,
-    /// Repeated corners merged into a vertex with identical coordinates (STL, which has no vertex numbers).
-    pub corners_welded: usize,
-    /// Nodes that only mid-side positions or left-out elements used, left out.
-    pub nodes_dropped: usize,
-    /// Volumes and other elements that are no faces, left out.
-    pub elements_dropped: usize,
 }
 
 /// The mesh of a file, and what the reader did besides reading; or why there is none.

@@ -69,6 +69,13 @@ fn read_vertices(bytes: &[u8], builder: &mut Builder, watch: &Watch) -> Result<(
                 *number = coordinate(&mut scanner, place)?;
             }
             builder.point(DVec3::from_array(position), place)?;
+            // A weight, a colour, or both may follow.
+            let more = std::iter::from_fn(|| scanner.word_on_line()).count();
+            if !matches!(more, 0 | 1 | 3 | 4 | 5) {
+                let found = format!("{} values", more + 3);
+                return Err(FormatError::unexpected(place, "a vertex of 3, 4, 6, 7 or 8 values", found.as_bytes())
+                    .with_remedy("the line has too many or too few values: export the file again"));
+            }
             if (builder.points() as u64).is_multiple_of(STRIDE) {
                 watch.check()?;
                 watch.advance(scanner.offset() as u64, || format!("{} vertices", builder.points()));

@@ -2,8 +2,8 @@
 //!
 //! Layout after the Geomview manual, chapter "OFF: numbered polygons" (Geometry Center, 1996). The prefixes `ST`, `C`
 //! and `N` are understood and their values skipped; `4` and `n` (more than three dimensions) are refused. The keyword
-//! may be missing, the counts may stand on its line, comments may stand anywhere, and values after the ones needed are
-//! ignored up to the end of the line. Binary files come in both byte orders and with or without the colours that the
+//! may be missing, the counts may stand on its line, and comments may stand anywhere. A vertex and a face are a line
+//! each; values after the ones needed are skipped, as many as a normal, a colour and a texture position have. Binary files come in both byte orders and with or without the colours that the
 //! manual asks for after each face, because programs differ; the variant is chosen that uses up the file exactly.
 //!
 //! OFF has no groups. The text writer adds them as comments after the last face, one line a group,
@@ -41,6 +41,13 @@ impl Variant {
     fn vertex_bytes(self) -> usize {
         4 * (3 + if self.normal { 3 } else { 0 } + if self.colour { 4 } else { 0 } + if self.texture { 2 } else { 0 })
     }
+
+    /// Whether a vertex of a text file may have `more` values after its coordinates: a normal, a colour of three or four,
+    /// and with texture two more. Programs leave them out, and write them where the keyword has no letter for them.
+    fn may_follow(self, more: usize) -> bool {
+        let usual = |more| matches!(more, 0 | 3 | 4 | 6 | 7);
+        usual(more) || (self.texture && more.checked_sub(2).is_some_and(usual))
+    }
 }
 
 fn sniff(bytes: &[u8]) -> bool {
@@ -56,7 +63,7 @@ fn read(bytes: &[u8], watch: &Watch) -> ReadResult {
         let start = bytes.len() - scanner.left();
         return read_binary(bytes, start, variant, watch);
     }
-    read_text(scanner, watch)
+    read_text(scanner, variant, watch)
 }
 
 /// Reads the keyword, if there is one, and `BINARY` after it.
@@ -91,7 +98,7 @@ fn read_keyword(scanner: &mut Scanner<'_>) -> Result<Variant, FormatError> {
     Ok(variant)
 }
 
-fn read_text(mut scanner: Scanner<'_>, watch: &Watch) -> ReadResult {
+fn read_text(mut scanner: Scanner<'_>, variant: Variant, watch: &Watch) -> ReadResult {
     // A vertex takes 6 bytes at least (`0 0 0` and a line end), a face 2.
     let points = scanner.count("vertices", 6)?;
     let faces = scanner.count("faces", 2)?;
@@ -102,12 +109,18 @@ fn read_text(mut scanner: Scanner<'_>, watch: &Watch) -> ReadResult {
         if vertex.is_multiple_of(STRIDE) {
             watch.check()?;
         }
+        go_to_item(&mut scanner, "the vertices")?;
         let mut position = [0.0; 3];
         for number in &mut position {
-            *number = scanner.number("a coordinate")?;
+            *number = scanner.number_on_line("a coordinate", "a vertex")?;
         }
         builder.point(DVec3::from_array(position), scanner.place())?;
-        scanner.next_line();
+        let more = std::iter::from_fn(|| scanner.word_on_line()).count();
+        if !variant.may_follow(more) {
+            let found = format!("{} values", more + 3);
+            return Err(FormatError::unexpected(scanner.place(), "three coordinates, perhaps a normal and a colour", found.as_bytes())
+                .with_remedy("the line has too many or too few values: export the file again"));
+        }
     }
     let mut corners = Vec::new();
     // The soup's faces differ in number from the file's where polygons were cut or dropped.
@@ -118,18 +131,30 @@ fn read_text(mut scanner: Scanner<'_>, watch: &Watch) -> ReadResult {
             watch.advance((points + face) as u64, || format!("{face} faces"));
         }
         corners.clear();
+        go_to_item(&mut scanner, "the faces")?;
         let count = scanner.count("corners", 2)?;
         let place = scanner.place();
         for _ in 0..count {
-            let number = scanner.integer("a vertex number")?;
-            corners.push(builder.vertex(number, 0, scanner.place())?);
+            let word = scanner.word_on_line().ok_or_else(|| FormatError::new(place, Reason::TooFew { within: "a face" }))?;
+            let number = parse_integer(word, "a vertex number", place)?;
+            corners.push(builder.vertex(number, 0, place)?);
         }
         first_of.push(builder.face(&corners, place)?.start);
-        scanner.next_line();
+        // A colour may follow: a number of a table, or three or four values.
+        let more = std::iter::from_fn(|| scanner.word_on_line()).count();
+        if !matches!(more, 0 | 1 | 3 | 4) {
+            return Err(FormatError::unexpected(place, "the end of the line or a colour", format!("{more} values").as_bytes())
+                .with_remedy("the number of corners does not fit the line: export the file again"));
+        }
     }
     first_of.push(builder.faces());
     read_groups(&mut builder, scanner.without_comments(), &first_of)?;
     builder.finish()
+}
+
+/// Goes to the line of the next item of a table.
+fn go_to_item(scanner: &mut Scanner<'_>, within: &'static str) -> Result<(), FormatError> {
+    if scanner.go_to_word() { Ok(()) } else { Err(FormatError::new(scanner.place(), Reason::Truncated { within })) }
 }
 
 fn read_binary(bytes: &[u8], start: usize, variant: Variant, watch: &Watch) -> ReadResult {

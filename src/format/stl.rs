@@ -64,7 +64,8 @@ fn weld(welder: &mut Welder, position: DVec3, place: Place) -> Result<VertexId, 
 fn finish(welder: Welder, faces: Vec<Facet>) -> (Soup, ReadCounts) {
     let corners = 3 * faces.len();
     let points = welder.into_points();
-    let counts = ReadCounts { corners_welded: corners - points.len(), ..ReadCounts::default() };
+    let mut counts = ReadCounts::default();
+    counts.corners_welded = corners - points.len();
     (Soup { points: points.into(), faces: faces.into(), ..Soup::default() }, counts)
 }
 

@@ -81,6 +81,18 @@ impl<'a> Scanner<'a> {
         }
     }
 
+    /// Goes before the next word, on this line or a later one; `false` when there is none.
+    pub(super) fn go_to_word(&mut self) -> bool {
+        loop {
+            self.skip_blanks();
+            match self.bytes.get(self.at) {
+                None => return false,
+                Some(b'\n' | b'\r') => self.line_end(),
+                Some(_) => return true,
+            }
+        }
+    }
+
     /// The rest of this line without blanks round it; the scanner stays before the line's end.
     pub(super) fn rest_of_line(&mut self) -> &'a [u8] {
         let start = self.at;
@@ -134,6 +146,12 @@ impl<'a> Scanner<'a> {
             Some(word) => parse_integer(word, what, self.place()),
             None => Err(FormatError::new(self.place(), Reason::Truncated { within: what })),
         }
+    }
+
+    /// A finite number on this line; `within` is what a line without one ends in.
+    pub(super) fn number_on_line(&mut self, what: &'static str, within: &'static str) -> Result<f64, FormatError> {
+        let word = self.word_on_line().ok_or_else(|| FormatError::new(self.place(), Reason::TooFew { within }))?;
+        parse_number(word, what, self.place())
     }
 
     /// A count on this line or a later one, each of which takes at least `bytes_each` bytes of what is left.

@@ -78,6 +78,8 @@ pub struct ReadStats {
     pub nodes_dropped: usize,
     /// Volumes and other elements that are no faces, left out.
     pub elements_dropped: usize,
+    /// All that the file has and the mesh has not, in words.
+    pub left_out: Vec<String>,
 }
 
 /// Why a file was refused.
@@ -115,7 +117,7 @@ pub fn read(file: &FileBytes, params: &ReadParams, watch: &Watch) -> Result<(Sou
     let (format, mut soup, counts) =
         read_format(file, params, watch).map_err(|error| ReadError::Format { name: file.name.clone(), error })?;
     scale_points(&mut soup, params.scale)?;
-    let stats = stats(format, &soup, counts);
+    let stats = stats(format, &soup, &counts);
     Ok((soup, stats))
 }
 
@@ -145,7 +147,7 @@ fn scale_points(soup: &mut Soup, scale: f64) -> Result<(), ReadError> {
     Ok(())
 }
 
-fn stats(format: Format, soup: &Soup, counts: ReadCounts) -> ReadStats {
+fn stats(format: Format, soup: &Soup, counts: &ReadCounts) -> ReadStats {
     let triangles = soup.faces.iter().filter(|f| matches!(f, Facet::Tri(_))).count();
     ReadStats {
         format,
@@ -160,6 +162,7 @@ fn stats(format: Format, soup: &Soup, counts: ReadCounts) -> ReadStats {
         corners_welded: counts.corners_welded,
         nodes_dropped: counts.nodes_dropped,
         elements_dropped: counts.elements_dropped,
+        left_out: counts.left_out(),
     }
 }
 
@@ -198,7 +201,7 @@ pub struct Step;
 
 impl StepContract for Step {
     const NAME: &'static str = "read";
-    const REVISION: u32 = 1;
+    const REVISION: u32 = 2;
     const INPUTS: &'static [InputDef] =
         &[InputDef { name: "file", accepts: &[Port::File], required: true, doc: "the mesh file" }];
     const OUTPUTS: &'static [OutputDef] = &[OutputDef { name: "main", port: OutPort::Is(Port::Soup), derive: None }];

@@ -145,26 +145,10 @@ impl Reader {
                     let what = "a cylindrical or spherical system of nodes".to_owned();
                     return Err(FormatError::new(place, Reason::Unsupported(what)));
                 }
-                Block::Nodes { set: value("NSET").map(|n| self.card(Kind::Nodes, n, false, self.scope)) }
+                Block::Nodes { set: value("NSET").map(|n| self.card(Kind::Nodes, n, line, self.scope)) }
             }
             "ELEMENT" => self.element_block(value("TYPE"), value("ELSET"), line)?,
-            "NSET" | "ELSET" | "SURFACE" => {
-                let key = match name.as_str() {
-                    "SURFACE" => value("NAME"),
-                    own => value(own),
-                };
-                let Some(set) = key.filter(|n| !n.is_empty()) else {
-                    return Err(FormatError::unexpected(place, "the name of a set", text.as_bytes()));
-                };
-                let kind = match (name.as_str(), value("TYPE")) {
-                    ("NSET", _) => Kind::Nodes,
-                    ("ELSET", _) => Kind::Elements,
-                    (_, Some(t)) if t.eq_ignore_ascii_case("NODE") => Kind::NodeSurface,
-                    _ => Kind::Surface,
-                };
-                let scope = self.scope_of(value("INSTANCE"), place)?;
-                Block::Set { card: self.card(kind, set, value("GENERATE").is_some(), scope) }
-            }
+            "NSET" | "ELSET" | "SURFACE" => self.set_block(&name, &value, line),
             "INCLUDE" => {
                 return Err(FormatError::new(place, Reason::Unsupported("*INCLUDE".into()))
                     .with_remedy("put the included file's lines in its place"));
@@ -197,12 +181,40 @@ impl Reader {
         Ok(None)
     }
 
+    /// A set or surface. What is not read of it is noted at its card: nodes and elements are whole without it.
+    fn set_block<'p>(&mut self, keyword: &str, value: &dyn Fn(&str) -> Option<&'p str>, line: u64) -> Block {
+        let name = value(if keyword == "SURFACE" { "NAME" } else { keyword }).unwrap_or("");
+        let mut unread = name.is_empty().then(|| "it has no name".to_owned());
+        let (kind, other) = match (keyword, value("TYPE").map(str::to_ascii_uppercase)) {
+            ("NSET", _) => (Kind::Nodes, "ELSET"),
+            ("ELSET", _) => (Kind::Elements, "NSET"),
+            (_, Some(kind)) if kind == "NODE" => (Kind::NodeSurface, "COMBINE"),
+            (_, kind) => {
+                if let Some(kind) = kind.filter(|kind| kind != "ELEMENT") {
+                    unread = Some(format!("TYPE={kind}"));
+                }
+                (Kind::Surface, "COMBINE")
+            }
+        };
+        if let Some(how) = value(other) {
+            unread = Some(format!("{other}={how}"));
+        }
+        let scope = self.scope_of(value("INSTANCE")).unwrap_or_else(|| {
+            unread = Some(format!("no instance `{}` is defined above", value("INSTANCE").unwrap_or_default()));
+            self.scope
+        });
+        let card = self.card(kind, name, line, scope);
+        self.cards[card].generate = value("GENERATE").is_some();
+        self.cards[card].unread = unread;
+        Block::Set { card }
+    }
+
     fn element_block(&mut self, kind: Option<&str>, set: Option<&str>, line: u64) -> Result<Block, FormatError> {
         let Some(kind) = kind else {
             return Err(FormatError::new(Place::Line(line), Reason::Nothing("element type (TYPE=)")));
         };
         let known = element_type(&kind.to_ascii_uppercase());
-        let set = set.map(|n| self.card(Kind::Elements, n, false, self.scope));
+        let set = set.map(|n| self.card(Kind::Elements, n, line, self.scope));
         Ok(Block::Elements { shape: known.map(|(s, _)| s), nodes: known.map_or(0, |(_, n)| n), set })
     }
 
@@ -221,14 +233,14 @@ impl Reader {
         Ok(Block::Instance { scope, lines: 0 })
     }
 
-    fn scope_of(&self, instance: Option<&str>, place: Place) -> Result<usize, FormatError> {
-        let Some(name) = instance else { return Ok(self.scope) };
-        let found = self.instances.get(&name.to_ascii_uppercase()).copied();
-        found.ok_or_else(|| FormatError::unexpected(place, "an instance defined above", name.as_bytes()))
+    fn scope_of(&self, instance: Option<&str>) -> Option<usize> {
+        let Some(name) = instance else { return Some(self.scope) };
+        self.instances.get(&name.to_ascii_uppercase()).copied()
     }
 
-    fn card(&mut self, kind: Kind, name: &str, generate: bool, scope: usize) -> usize {
-        self.cards.push(Card { kind, name: name.to_owned(), generate, scope, members: Vec::new(), rows: Vec::new() });
+    fn card(&mut self, kind: Kind, name: &str, line: u64, scope: usize) -> usize {
+        let (members, rows) = (Vec::new(), Vec::new());
+        self.cards.push(Card { kind, name: name.to_owned(), generate: false, scope, members, rows, line, unread: None });
         self.cards.len() - 1
     }
 
@@ -238,7 +250,10 @@ impl Reader {
             Block::Skip => Ok(()),
             Block::Nodes { set } => self.node(line, set, place),
             Block::Elements { shape, nodes, set } => self.element(line, (shape, nodes, set), number),
-            Block::Set { card } => self.cards[card].row(line, place),
+            Block::Set { card } => {
+                self.cards[card].row(line, place);
+                Ok(())
+            }
             Block::Instance { scope, lines } => {
                 self.block = Block::Instance { scope, lines: lines + 1 };
                 self.place_instance(scope, lines, line, place)
@@ -255,6 +270,10 @@ impl Reader {
             if let Some(item) = items.next().filter(|i| !i.is_empty()) {
                 position[axis] = parse_number(item, "a coordinate", place)?;
             }
+        }
+        // A normal may follow.
+        if let Some(item) = items.nth(3).filter(|i| !i.is_empty()) {
+            return Err(FormatError::unexpected(place, "the end of the node", item));
         }
         let next = self.points.len() as u32;
         if self.scopes[self.scope].nodes.insert(id, next).is_some() {
@@ -292,9 +311,16 @@ impl Reader {
         if shape.is_none() {
             return Ok(());
         }
-        for item in items.take(self.missing).collect::<Vec<_>>() {
-            self.element_nodes.push(parse_integer(item, "a node number", place)?);
-            self.missing -= 1;
+        // Beams may name a node for their orientation, and wedges of 15 nodes may have three more.
+        let may_have_more = shape == Some(Shape::Line) || nodes == 15;
+        for item in items {
+            if self.missing > 0 {
+                self.element_nodes.push(parse_integer(item, "a node number", place)?);
+                self.missing -= 1;
+            } else if !item.is_empty() && !may_have_more {
+                return Err(FormatError::unexpected(place, "the end of the element", item)
+                    .with_remedy("this line has too many nodes for the element type, or one before it too few"));
+            }
         }
         if let Some(element) = self.elements.last_mut() {
             element.end = self.element_nodes.len();
@@ -354,8 +380,10 @@ impl Reader {
         }
         let mut soup = Soup { points: self.points.into(), ..Soup::default() };
         let sides: Vec<_> = elements.faces.clone();
-        soup.carried.groups = Sets::resolve(&self.scopes, self.cards, &placed, &sides, soup.points.len())?;
-        let counts = elements.finish(&mut soup)?;
+        let (groups, notes) = Sets::resolve(&self.scopes, self.cards, &placed, &sides, soup.points.len())?;
+        soup.carried.groups = groups;
+        let mut counts = elements.finish(&mut soup)?;
+        notes.iter().for_each(|note| counts.note(note));
         Ok((soup, counts))
     }
 }

@@ -36,6 +36,10 @@ pub(super) struct Card {
     pub(super) members: Vec<u32>,
     /// Items of the data lines: of surfaces whole lines, else single items.
     pub(super) rows: Vec<(Row, Place)>,
+    /// Its line.
+    pub(super) line: u64,
+    /// What in it is not read, such as a parameter. Such a card makes no group.
+    pub(super) unread: Option<String>,
 }
 
 /// An item of a set.
@@ -52,8 +56,16 @@ pub(super) enum Row {
 }
 
 impl Card {
-    /// Takes a data line.
-    pub(super) fn row(&mut self, line: &[u8], place: Place) -> Result<(), FormatError> {
+    /// Takes a data line. Where it is no line of a set, the card makes no group.
+    pub(super) fn row(&mut self, line: &[u8], place: Place) {
+        if self.unread.is_none()
+            && let Err(error) = self.read_row(line, place)
+        {
+            self.unread = Some(error.reason.to_string());
+        }
+    }
+
+    fn read_row(&mut self, line: &[u8], place: Place) -> Result<(), FormatError> {
         let line = line.strip_suffix(b",").unwrap_or(line);
         let mut items = line.split(|&b| b == b',').map(<[u8]>::trim_ascii);
         let text = |item: &[u8]| String::from_utf8_lossy(item).trim_matches('"').to_owned();
@@ -89,6 +101,18 @@ struct Set {
     edges: Vec<EdgeKey>,
 }
 
+/// What a card's rows mean.
+struct Found {
+    members: Vec<u32>,
+    edges: Vec<EdgeKey>,
+}
+
+impl Found {
+    fn len(&self) -> usize {
+        self.members.len() + self.edges.len()
+    }
+}
+
 /// All sets, by kind, part and name in upper case.
 #[derive(Debug)]
 pub(super) struct Sets<'a> {
@@ -96,6 +120,8 @@ pub(super) struct Sets<'a> {
     placed: &'a [Placed],
     faces: &'a [Facet],
     known: BTreeMap<(Kind, usize, String), Set>,
+    /// What was left out.
+    notes: Vec<String>,
     /// How many members may still be added; sets that name sets could grow without bound.
     budget: usize,
 }
@@ -108,46 +134,46 @@ impl<'a> Sets<'a> {
         placed: &'a [Placed],
         faces: &'a [Facet],
         nodes: usize,
-    ) -> Result<Groups, FormatError> {
+    ) -> Result<(Groups, Vec<String>), FormatError> {
         let budget = 64 * (nodes + placed.len() + 1024);
-        let mut sets = Self { scopes, placed, faces, known: BTreeMap::new(), budget };
+        let mut sets = Self { scopes, placed, faces, known: BTreeMap::new(), notes: Vec::new(), budget };
         // Surfaces may stand before the sets that they name.
         let (surfaces, plain): (Vec<Card>, Vec<Card>) =
             cards.into_iter().partition(|c| matches!(c.kind, Kind::Surface | Kind::NodeSurface));
         for card in plain.into_iter().chain(surfaces) {
             sets.add(card)?;
         }
-        Ok(sets.into_groups(nodes))
+        let notes = std::mem::take(&mut sets.notes);
+        Ok((sets.into_groups(nodes), notes))
     }
 
+    /// Adds what a card holds to its set. A card that cannot be understood is left out whole and named, since half a set
+    /// under its full name would deceive; numbers that nobody has are left out of it, as the solvers do.
     fn add(&mut self, card: Card) -> Result<(), FormatError> {
-        let mut members = card.members;
-        let mut edges = Vec::new();
+        let what = match card.kind {
+            Kind::Nodes => "node set",
+            Kind::Elements => "element set",
+            Kind::Surface | Kind::NodeSurface => "surface",
+        };
+        let what = format!("{what} `{}` (line {})", card.name, card.line);
+        if let Some(unread) = &card.unread {
+            self.notes.push(format!("{what}: {unread}"));
+            return Ok(());
+        }
+        let mut missing = 0;
+        let mut found = Found { members: card.members, edges: Vec::new() };
         for (row, place) in card.rows {
-            let before = members.len() + edges.len();
-            match row {
-                Row::Id(id) => members.push(self.position(card.kind, card.scope, id, place)?),
-                Row::Range(first, last, step) => self.range(card.kind, card.scope, [first, last, step], &mut members),
-                Row::Name(name) => members.extend(self.members(card.kind, card.scope, &name, place)?),
-                Row::Side(of, side) => {
-                    let base = if card.kind == Kind::NodeSurface { Kind::Nodes } else { Kind::Elements };
-                    let named = match parse_integer(of.as_bytes(), "a number", place) {
-                        Ok(id) => vec![self.position(base, card.scope, id, place)?],
-                        Err(_) => self.members(base, card.scope, &of, place)?.to_vec(),
-                    };
-                    match side.strip_prefix('E').and_then(|n| n.parse::<usize>().ok()) {
-                        Some(number) if base == Kind::Elements => edges.extend(self.sides(&named, number)),
-                        _ => members.extend(named),
-                    }
-                }
+            let before = found.len();
+            if let Err(why) = self.resolve_row(card.kind, card.scope, row, &mut found, &mut missing) {
+                self.notes.push(format!("{what}: {why}"));
+                return Ok(());
             }
-            let grown = members.len() + edges.len() - before;
-            self.budget = self.budget.checked_sub(grown).ok_or_else(|| {
-                FormatError::new(
-                    place,
-                    Reason::TooMany { what: "members of sets", limit: 64 * self.placed.len() as u64 },
-                )
-            })?;
+            let limit = 64 * self.placed.len() as u64;
+            let error = || FormatError::new(place, Reason::TooMany { what: "members of sets", limit });
+            self.budget = self.budget.checked_sub(found.len() - before).ok_or_else(error)?;
+        }
+        if missing > 0 {
+            self.notes.push(format!("{missing} members of {what}, which the file does not have"));
         }
         let key = (card.kind, card.scope, card.name.to_ascii_uppercase());
         let set = self.known.entry(key).or_default();
@@ -155,10 +181,53 @@ impl<'a> Sets<'a> {
             set.name = card.name;
             set.scope = card.scope;
         }
-        set.members.extend(members);
+        set.members.extend(found.members);
         set.members.sort_unstable();
         set.members.dedup();
-        set.edges.extend(edges);
+        set.edges.extend(found.edges);
+        Ok(())
+    }
+
+    /// What one item of a set means, or why it means nothing.
+    fn resolve_row(
+        &self,
+        kind: Kind,
+        scope: usize,
+        row: Row,
+        found: &mut Found,
+        missing: &mut usize,
+    ) -> Result<(), String> {
+        match row {
+            Row::Id(id) => match self.numbers(kind, scope).get(&id) {
+                Some(&position) => found.members.push(position),
+                None => *missing += 1,
+            },
+            Row::Range(first, last, step) => self.range(kind, scope, [first, last, step], &mut found.members),
+            Row::Name(name) => found.members.extend(self.members(kind, scope, &name)?),
+            Row::Side(of, side) => {
+                let base = if kind == Kind::NodeSurface { Kind::Nodes } else { Kind::Elements };
+                let single;
+                let named = match of.parse::<i64>() {
+                    Ok(id) => {
+                        single = self.numbers(base, scope).get(&id).copied();
+                        *missing += usize::from(single.is_none());
+                        single.as_slice()
+                    }
+                    Err(_) if of.is_empty() => return Err("all free faces of the model".into()),
+                    Err(_) => self.members(base, scope, &of)?,
+                };
+                let numbered = |letter| side.strip_prefix(letter).and_then(|n: &str| n.parse::<usize>().ok());
+                if base == Kind::Nodes {
+                    found.members.extend(named);
+                } else if let Some(number) = numbered('E') {
+                    found.edges.extend(self.sides(named, number));
+                } else if side.is_empty() || side == "SPOS" || side == "SNEG" || numbered('S').is_some() {
+                    found.members.extend(named);
+                } else {
+                    return Err(format!("side `{side}`"));
+                }
+            }
+        }
         Ok(())
     }
 
@@ -167,13 +236,6 @@ impl<'a> Sets<'a> {
             Kind::Nodes | Kind::NodeSurface => &self.scopes[scope].nodes,
             Kind::Elements | Kind::Surface => &self.scopes[scope].elements,
         }
-    }
-
-    fn position(&self, kind: Kind, scope: usize, id: i64, place: Place) -> Result<u32, FormatError> {
-        let numbers = self.numbers(kind, scope);
-        let what = if matches!(kind, Kind::Nodes | Kind::NodeSurface) { "node" } else { "element" };
-        let missing = || FormatError::new(place, Reason::OutOfRange { what, index: id, count: numbers.len() as u64 });
-        numbers.get(&id).copied().ok_or_else(missing)
     }
 
     /// Numbers in a range that nobody has are skipped, as the solvers do.
@@ -203,13 +265,12 @@ impl<'a> Sets<'a> {
     }
 
     /// The members of a set of the same part, or of the assembly.
-    fn members(&self, kind: Kind, scope: usize, name: &str, place: Place) -> Result<&[u32], FormatError> {
+    fn members(&self, kind: Kind, scope: usize, name: &str) -> Result<&[u32], String> {
         let upper = name.to_ascii_uppercase();
         let own = self.known.get(&(kind, scope, upper.clone()));
         // A surface of the assembly names sets of its instances.
         let found = own.or_else(|| (0..self.scopes.len()).find_map(|s| self.known.get(&(kind, s, upper.clone()))));
-        let missing = || FormatError::unexpected(place, "a set defined in this file", name.as_bytes());
-        Ok(&found.ok_or_else(missing)?.members)
+        found.map(|set| set.members.as_slice()).ok_or_else(|| format!("no set `{name}` could be read from the file"))
     }
 
     /// Side `number`, counted from 1, of each face among the elements.

@@ -8,7 +8,8 @@
 //! volumes are left out. A physical group becomes a face, edge or vertex group after its dimension, `physical_TAG` where
 //! it has no name. A file without physical groups gives its elementary entities as groups: `surface_TAG` where there
 //! are several surfaces, and `curve_TAG`. In version 2 an element of several groups is written once for each of them:
-//! elements of equal nodes and entity in different groups are one face. Node numbers may have gaps and any order;
+//! elements of equal nodes and entity in different groups are one face. The pieces of a partitioned mesh count as the
+//! entities that they are pieces of; elements of an entity that the file does not define are an error. Node numbers may have gaps and any order;
 //! parameters of nodes are skipped. `NodeData` and `ElementData` become fields, of several time steps the last one.
 //!
 //! Writing: version 4.1 (`msh`) or 2.2 (`msh22`). Faces in the same groups are one entity; groups and regions are

@@ -48,12 +48,16 @@ struct Data {
     rows: Vec<(i64, Vec<f64>)>,
 }
 
+/// The entity that an entity is a piece of, itself where it is whole and none where it lies between pieces, and its
+/// physical groups.
+type Entity = (Option<i64>, Vec<i64>);
+
 /// What the sections say.
 #[derive(Debug, Default)]
 pub(super) struct Model<'w> {
     names: BTreeMap<(i64, i64), String>,
-    /// The physical groups of each entity, by dimension and tag (version 4).
-    pub(super) physicals: BTreeMap<(i64, i64), Vec<i64>>,
+    /// The entities by dimension and tag (version 4).
+    known: BTreeMap<(i64, i64), Entity>,
     points: Vec<DVec3>,
     nodes: FxHashMap<i64, u32>,
     elements: Elements,
@@ -79,6 +83,7 @@ pub(super) fn read(bytes: &[u8], watch: &Watch) -> Result<(Soup, ReadCounts), Fo
         match name {
             b"PhysicalNames" => model.physical_names(&mut input)?,
             b"Entities" if version_4 => v4::entities(&mut input, &mut model)?,
+            b"PartitionedEntities" if version_4 => v4::partitioned_entities(&mut input, &mut model)?,
             b"Nodes" if version_4 => v4::nodes(&mut input, &mut model)?,
             b"Elements" if version_4 => v4::elements(&mut input, &mut model)?,
             b"Nodes" => v2::nodes(&mut input, &mut model, false)?,
@@ -179,8 +184,40 @@ impl Model<'_> {
         self.nodes.get(&tag).copied().ok_or_else(missing)
     }
 
+    /// Adds a whole entity with its physical groups.
+    pub(super) fn entity(&mut self, (dimension, tag): (i64, i64), groups: Vec<i64>) {
+        self.known.insert((dimension, tag), (Some(tag), groups));
+    }
+
+    /// Adds a piece of `parent`, or what lies between pieces where that has another dimension.
+    pub(super) fn piece(&mut self, piece: (i64, i64), parent: (i64, i64), mut groups: Vec<i64>) {
+        let whole = self.known.get(&parent).filter(|_| parent.0 == piece.0);
+        if let Some((_, inherited)) = whole.filter(|_| groups.is_empty()) {
+            groups.clone_from(inherited);
+        }
+        self.known.insert(piece, (whole.map(|_| parent.1), groups));
+    }
+
+    /// What is known of the entity of some elements. Files without entities at all have no groups.
+    pub(super) fn groups_of(&self, entity: (i64, i64), place: Place) -> Result<Entity, FormatError> {
+        if self.known.is_empty() {
+            return Ok((Some(entity.1), Vec::new()));
+        }
+        let (dimension, index) = entity;
+        let what = ["point", "curve", "surface", "volume"].get(dimension.unsigned_abs() as usize).unwrap_or(&"entity");
+        let count = self.known.keys().filter(|(d, _)| *d == dimension).count() as u64;
+        let missing = || FormatError::new(place, Reason::OutOfRange { what, index, count });
+        self.known.get(&entity).cloned().ok_or_else(missing)
+    }
+
     /// Adds an element of the entity with this tag; `nodes` are positions, as many as the type has.
-    pub(super) fn element(&mut self, tag: i64, kind: i64, entity: i64, nodes: &[u32]) -> Result<Placed, FormatError> {
+    pub(super) fn element(
+        &mut self,
+        tag: i64,
+        kind: i64,
+        entity: Option<i64>,
+        nodes: &[u32],
+    ) -> Result<Placed, FormatError> {
         self.count += 1;
         if self.count.is_multiple_of(STRIDE) {
             self.watch.map_or(Ok(()), Watch::check)?;
@@ -197,7 +234,9 @@ impl Model<'_> {
         if let Placed::Faces(range) = &placed {
             self.face_tags.push((tag, range.start as u32));
         }
-        self.entities.entry((i64::from(dimension), entity)).or_default().add(&placed);
+        if let Some(entity) = entity {
+            self.entities.entry((i64::from(dimension), entity)).or_default().add(&placed);
+        }
         Ok(placed)
     }
 

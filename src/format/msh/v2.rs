@@ -103,7 +103,7 @@ fn element(
         positions.push(model.position(node, place)?);
     }
     if physical == 0 {
-        model.element(tag, kind, entity, &positions)?;
+        model.element(tag, kind, Some(entity), &positions)?;
         return Ok(());
     }
     let mut key = [u32::MAX; 4];
@@ -113,7 +113,7 @@ fn element(
         model.group(kind, physical, placed)?;
         return Ok(());
     }
-    let placed = model.element(tag, kind, entity, &positions)?;
+    let placed = model.element(tag, kind, Some(entity), &positions)?;
     model.group(kind, physical, &placed)?;
     seen.0.insert((key, kind, entity), (placed, smallvec::smallvec![physical]));
     Ok(())

@@ -11,33 +11,70 @@ use super::v2::{point, unknown};
 /// `$Entities`: only the physical groups of each entity matter.
 pub(super) fn entities(input: &mut Input<'_>, model: &mut Model<'_>) -> Result<(), FormatError> {
     input.end_line();
+    for (dimension, count) in (0..).zip(entity_counts(input)?) {
+        for _ in 0..count {
+            let tag = input.int("the tag of an entity")?;
+            let groups = bounds_and_groups(input, dimension)?;
+            model.entity((dimension, tag), groups);
+        }
+    }
+    Ok(())
+}
+
+/// `$PartitionedEntities`: pieces of entities, and the interfaces between them. A piece is in the groups of its own and
+/// stands for the entity that it is a piece of; an interface is of a higher entity and stands for none.
+pub(super) fn partitioned_entities(input: &mut Input<'_>, model: &mut Model<'_>) -> Result<(), FormatError> {
+    input.end_line();
+    input.size("a number of partitions")?;
+    let ghosts = input.size("a number of ghost entities")?;
+    for _ in 0..input.claim(ghosts, 4, 8, "ghost entities")? {
+        input.int("the tag of a ghost entity")?;
+        input.int("a partition")?;
+    }
+    for (dimension, count) in (0..).zip(entity_counts(input)?) {
+        for _ in 0..count {
+            let tag = input.int("the tag of an entity")?;
+            let parent = (input.int("the dimension of a whole entity")?, input.int("the tag of a whole entity")?);
+            let partitions = input.size("a number of partitions")?;
+            for _ in 0..input.claim(partitions, 2, 4, "partitions")? {
+                input.int("a partition")?;
+            }
+            let groups = bounds_and_groups(input, dimension)?;
+            model.piece((dimension, tag), parent, groups);
+        }
+    }
+    Ok(())
+}
+
+/// How many points, curves, surfaces and volumes follow.
+fn entity_counts(input: &mut Input<'_>) -> Result<[usize; 4], FormatError> {
     let mut counts = [0; 4];
     for count in &mut counts {
         let announced = input.size("a number of entities")?;
         *count = input.claim(announced, 10, 36, "entities")?;
     }
-    for (dimension, count) in (0..).zip(counts) {
-        for _ in 0..count {
-            let tag = input.int("the tag of an entity")?;
-            for _ in 0..if dimension == 0 { 3 } else { 6 } {
-                // Boxes of entities without nodes may be infinite; they are not used.
-                input.any_float("a bound of an entity")?;
-            }
-            let announced = input.size("a number of physical tags")?;
-            let mut groups = Vec::with_capacity(input.claim(announced, 2, 4, "physical tags")?);
-            for _ in 0..announced {
-                groups.push(input.int("a physical tag")?);
-            }
-            model.physicals.insert((dimension, tag), groups);
-            if dimension > 0 {
-                let announced = input.size("a number of bounding entities")?;
-                for _ in 0..input.claim(announced, 2, 4, "bounding entities")? {
-                    input.int("the tag of a bounding entity")?;
-                }
-            }
+    Ok(counts)
+}
+
+/// The physical groups of an entity; what bounds it is not used.
+fn bounds_and_groups(input: &mut Input<'_>, dimension: i64) -> Result<Vec<i64>, FormatError> {
+    for _ in 0..if dimension == 0 { 3 } else { 6 } {
+        // Boxes of entities without nodes may be infinite.
+        input.any_float("a bound of an entity")?;
+    }
+    let announced = input.size("a number of physical tags")?;
+    let count = input.claim(announced, 2, 4, "physical tags")?;
+    let mut groups = Vec::with_capacity(count);
+    for _ in 0..count {
+        groups.push(input.int("a physical tag")?);
+    }
+    if dimension > 0 {
+        let announced = input.size("a number of bounding entities")?;
+        for _ in 0..input.claim(announced, 2, 4, "bounding entities")? {
+            input.int("the tag of a bounding entity")?;
         }
     }
-    Ok(())
+    Ok(groups)
 }
 
 /// `$Nodes`.
@@ -79,12 +116,12 @@ pub(super) fn elements(input: &mut Input<'_>, model: &mut Model<'_>) -> Result<(
     }
     for _ in 0..input.claim(blocks, 8, 20, "blocks of elements")? {
         let dimension = input.int("a dimension")?;
-        let entity = input.int("the tag of an entity")?;
         let place = input.place();
+        let entity = input.int("the tag of an entity")?;
         let kind = input.int("an element type")?;
         let announced = input.size("a number of elements")?;
         let Some((_, nodes)) = element_type(kind) else { return Err(unknown(kind, place)) };
-        let groups = model.physicals.get(&(dimension, entity)).cloned().unwrap_or_default();
+        let (whole, groups) = model.groups_of((dimension, entity), place)?;
         for _ in 0..input.claim(announced, 2 + 2 * nodes, 8 + 8 * nodes, "elements")? {
             let place = input.place();
             let tag = input.size("an element number")?;
@@ -93,7 +130,7 @@ pub(super) fn elements(input: &mut Input<'_>, model: &mut Model<'_>) -> Result<(
                 let node = input.size("a node number")?;
                 positions.push(model.position(node, place)?);
             }
-            let placed = model.element(tag, kind, entity, &positions)?;
+            let placed = model.element(tag, kind, whole, &positions)?;
             for &group in &groups {
                 model.group(kind, group, &placed)?;
             }

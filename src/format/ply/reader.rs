@@ -28,6 +28,7 @@ pub(super) fn read(bytes: &[u8], watch: &Watch) -> ReadResult {
     for element in &head.elements {
         body.read_element(element, &head, watch)?;
     }
+    body.source.end()?;
     body.finish(&head)
 }
 
@@ -69,9 +70,13 @@ impl Source<'_> {
         const WITHIN: &str = "an element";
         let reader = match self {
             Self::Text(scanner) => {
-                let word = scanner.word();
+                let word = scanner.word_on_line();
                 let place = scanner.place();
-                let word = word.ok_or_else(|| FormatError::new(place, Reason::Truncated { within: WITHIN }))?;
+                let short = || {
+                    FormatError::new(place, Reason::TooFew { within: WITHIN })
+                        .with_remedy("the line has fewer values than the head announces: export it again")
+                };
+                let word = word.ok_or_else(short)?;
                 return match parse_number(word, "a number", place) {
                     Err(FormatError { reason: Reason::NotFinite { .. }, .. }) => Ok(f64::NAN),
                     other => other,
@@ -91,6 +96,32 @@ impl Source<'_> {
             Scalar::F32 => f64::from(reader.f32(WITHIN)?),
             Scalar::F64 => reader.f64(WITHIN)?,
         })
+    }
+
+    /// Goes to the line of the next item of a table; blank lines are none.
+    fn begin_item(&mut self, table: &'static str) -> Result<(), FormatError> {
+        let Self::Text(scanner) = self else { return Ok(()) };
+        if scanner.go_to_word() { Ok(()) } else { Err(FormatError::new(scanner.place(), Reason::Truncated { within: table })) }
+    }
+
+    /// An item of a text table ends with its line: a value too many must not become part of the next item.
+    fn end_item(&mut self) -> Result<(), FormatError> {
+        let Self::Text(scanner) = self else { return Ok(()) };
+        match scanner.word_on_line() {
+            None => Ok(()),
+            Some(word) => Err(FormatError::unexpected(scanner.place(), "the end of the line", word)
+                .with_remedy("the line has more values than the head announces: add them as properties, or export it again")),
+        }
+    }
+
+    /// After all tables a text file is at its end.
+    fn end(&mut self) -> Result<(), FormatError> {
+        let Self::Text(scanner) = self else { return Ok(()) };
+        match scanner.word() {
+            None => Ok(()),
+            Some(word) => Err(FormatError::unexpected(scanner.place(), "the end of the file", word)
+                .with_remedy("the file has more lines than the head announces: export it again")),
+        }
     }
 
     fn integer(&mut self, scalar: Scalar) -> Result<i64, FormatError> {
@@ -221,6 +252,7 @@ impl<'a> Body<'a> {
     }
 
     fn read_item(&mut self, element: &Element, roles: &[Role]) -> Result<(), FormatError> {
+        self.source.begin_item("a table")?;
         let place = self.source.place();
         let mut position = None;
         let mut ends = ([None; 2], -1);
@@ -248,6 +280,7 @@ impl<'a> Body<'a> {
                 Role::Skipped => self.source.skip(property)?,
             }
         }
+        self.source.end_item()?;
         if let Some(position) = position {
             self.builder.point(position, place)?;
         }
