@@ -133,7 +133,10 @@ fn a_set_or_surface_that_is_not_understood_is_left_out_and_named() {
         ("*SURFACE, NAME=s\nskin, EDGE\n", "surface `s` (line 10): side `EDGE`"),
         ("*SURFACE, NAME=s\nrest, SPOS\n", "surface `s` (line 10): no set `rest` could be read from the file"),
         ("*ELSET, ELSET=s\nskin, rest\n", "element set `s` (line 10): no set `rest` could be read from the file"),
-        ("*ELSET, ELSET=s, GENERATE\none, 2\n", "element set `s` (line 10): expected a range of numbers, found \"one\""),
+        (
+            "*ELSET, ELSET=s, GENERATE\none, 2\n",
+            "element set `s` (line 10): expected a range of numbers, found \"one\"",
+        ),
         ("*NSET, NSET=s, INSTANCE=I\n1\n", "node set `s` (line 10): no instance `I` is defined above"),
         ("*NSET\n1\n", "node set `` (line 10): it has no name"),
         ("*NSET, NSET=s, ELSET=skin\n", "node set `s` (line 10): ELSET=skin"),

@@ -267,7 +267,9 @@ pub(super) fn left_out(report: &Report) -> Vec<String> {
     let steps = report.cases.iter().flat_map(|case| &case.steps);
     let lines: BTreeSet<String> = steps
         .filter_map(|step| Some((&step.name, step.stats.as_ref()?.get("left-out")?.as_array()?)))
-        .flat_map(|(name, all)| all.iter().filter_map(move |what| Some(format!("{name}: left out on reading: {}", what.as_str()?))))
+        .flat_map(|(name, all)| {
+            all.iter().filter_map(move |what| Some(format!("{name}: left out on reading: {}", what.as_str()?)))
+        })
         .collect();
     lines.into_iter().collect()
 }

@@ -34,7 +34,11 @@ impl ReadCounts {
         let mut note = String::with_capacity(what.len());
         for letter in what.chars() {
             // Writing to a string cannot fail.
-            let _ = if letter.is_control() { write!(note, "{}", letter.escape_default()) } else { write!(note, "{letter}") };
+            let _ = if letter.is_control() {
+                write!(note, "{}", letter.escape_default())
+            } else {
+                write!(note, "{letter}")
+            };
         }
         self.notes.push(note);
     }

@@ -118,8 +118,12 @@ fn read_text(mut scanner: Scanner<'_>, variant: Variant, watch: &Watch) -> ReadR
         let more = std::iter::from_fn(|| scanner.word_on_line()).count();
         if !variant.may_follow(more) {
             let found = format!("{} values", more + 3);
-            return Err(FormatError::unexpected(scanner.place(), "three coordinates, perhaps a normal and a colour", found.as_bytes())
-                .with_remedy("the line has too many or too few values: export the file again"));
+            return Err(FormatError::unexpected(
+                scanner.place(),
+                "three coordinates, perhaps a normal and a colour",
+                found.as_bytes(),
+            )
+            .with_remedy("the line has too many or too few values: export the file again"));
         }
     }
     let mut corners = Vec::new();
@@ -135,7 +139,8 @@ fn read_text(mut scanner: Scanner<'_>, variant: Variant, watch: &Watch) -> ReadR
         let count = scanner.count("corners", 2)?;
         let place = scanner.place();
         for _ in 0..count {
-            let word = scanner.word_on_line().ok_or_else(|| FormatError::new(place, Reason::TooFew { within: "a face" }))?;
+            let word =
+                scanner.word_on_line().ok_or_else(|| FormatError::new(place, Reason::TooFew { within: "a face" }))?;
             let number = parse_integer(word, "a vertex number", place)?;
             corners.push(builder.vertex(number, 0, place)?);
         }
@@ -143,8 +148,12 @@ fn read_text(mut scanner: Scanner<'_>, variant: Variant, watch: &Watch) -> ReadR
         // A colour may follow: a number of a table, or three or four values.
         let more = std::iter::from_fn(|| scanner.word_on_line()).count();
         if !matches!(more, 0 | 1 | 3 | 4) {
-            return Err(FormatError::unexpected(place, "the end of the line or a colour", format!("{more} values").as_bytes())
-                .with_remedy("the number of corners does not fit the line: export the file again"));
+            return Err(FormatError::unexpected(
+                place,
+                "the end of the line or a colour",
+                format!("{more} values").as_bytes(),
+            )
+            .with_remedy("the number of corners does not fit the line: export the file again"));
         }
     }
     first_of.push(builder.faces());

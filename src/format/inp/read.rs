@@ -240,7 +240,16 @@ impl Reader {
 
     fn card(&mut self, kind: Kind, name: &str, line: u64, scope: usize) -> usize {
         let (members, rows) = (Vec::new(), Vec::new());
-        self.cards.push(Card { kind, name: name.to_owned(), generate: false, scope, members, rows, line, unread: None });
+        self.cards.push(Card {
+            kind,
+            name: name.to_owned(),
+            generate: false,
+            scope,
+            members,
+            rows,
+            line,
+            unread: None,
+        });
         self.cards.len() - 1
     }
 

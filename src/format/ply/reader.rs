@@ -101,7 +101,11 @@ impl Source<'_> {
     /// Goes to the line of the next item of a table; blank lines are none.
     fn begin_item(&mut self, table: &'static str) -> Result<(), FormatError> {
         let Self::Text(scanner) = self else { return Ok(()) };
-        if scanner.go_to_word() { Ok(()) } else { Err(FormatError::new(scanner.place(), Reason::Truncated { within: table })) }
+        if scanner.go_to_word() {
+            Ok(())
+        } else {
+            Err(FormatError::new(scanner.place(), Reason::Truncated { within: table }))
+        }
     }
 
     /// An item of a text table ends with its line: a value too many must not become part of the next item.
@@ -109,8 +113,9 @@ impl Source<'_> {
         let Self::Text(scanner) = self else { return Ok(()) };
         match scanner.word_on_line() {
             None => Ok(()),
-            Some(word) => Err(FormatError::unexpected(scanner.place(), "the end of the line", word)
-                .with_remedy("the line has more values than the head announces: add them as properties, or export it again")),
+            Some(word) => Err(FormatError::unexpected(scanner.place(), "the end of the line", word).with_remedy(
+                "the line has more values than the head announces: add them as properties, or export it again",
+            )),
         }
     }
 
