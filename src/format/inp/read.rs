@@ -392,7 +392,9 @@ impl Reader {
         let (groups, notes) = Sets::resolve(&self.scopes, self.cards, &placed, &sides, soup.points.len())?;
         soup.carried.groups = groups;
         let mut counts = elements.finish(&mut soup)?;
-        notes.iter().for_each(|note| counts.note(note));
+        for note in &notes {
+            counts.note(note);
+        }
         Ok((soup, counts))
     }
 }
