@@ -11,8 +11,16 @@ pub fn printable(text: &str) -> Cow<'_, str> {
     Cow::Owned(text.chars().flat_map(|c| if steers(c) { c.escape_default().collect() } else { vec![c] }).collect())
 }
 
+/// The same for a text of several lines, whose breaks are meant.
+pub fn printable_lines(text: &str) -> Cow<'_, str> {
+    if text.lines().all(|line| matches!(printable(line), Cow::Borrowed(_))) {
+        return Cow::Borrowed(text);
+    }
+    Cow::Owned(text.split('\n').map(printable).collect::<Vec<_>>().join("\n"))
+}
+
 /// Control characters, the directional marks and overrides of Unicode, and its separators of lines and paragraphs.
-fn steers(letter: char) -> bool {
+pub fn steers(letter: char) -> bool {
     letter.is_control()
         || matches!(letter, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }
@@ -25,6 +33,7 @@ mod tests {
     fn what_steers_a_terminal_is_escaped_and_nothing_else() {
         assert_eq!(printable("red\u{1b}[31m\nline"), "red\\u{1b}[31m\\nline");
         assert_eq!(printable("gpj.\u{202e}exe"), "gpj.\\u{202e}exe");
+        assert_eq!(printable_lines("a\u{7}\nb"), "a\\u{7}\nb");
         for plain in ["Wand süd", "支持面", "محور", "a b\u{a0}c"] {
             assert!(matches!(printable(plain), Cow::Borrowed(text) if text == plain));
         }

@@ -176,6 +176,60 @@ fn json_is_one_document_on_stdout() {
 }
 
 #[test]
+fn what_is_printed_as_json_has_one_shape_and_its_schema() {
+    let desk = Desk::new();
+    fs::write(desk.path("other.obj"), CUBE.replace("v 1 1 1", "v 1 1 2")).unwrap();
+    let text = fs::read_to_string(desk.path("recipe.toml")).unwrap();
+    fs::write(desk.path("measured.toml"), text + "\n[steps.numbers]\nuse = \"measure\"\nfrom = \"clean\"\n").unwrap();
+    desk.meshmill(&["run", "recipe.toml", "--out", "a", "-q"]).assert().success();
+    desk.meshmill(&["run", "recipe.toml", "--out", "b", "-q", "--input", "part=other.obj"]).output().unwrap();
+    let schema: serde_json::Value =
+        serde_json::from_slice(&desk.meshmill(&["schema", "output"]).assert().success().get_output().stdout).unwrap();
+    let schema = jsonschema::draft7::new(&schema).unwrap();
+    let commands: [(&[&str], &str, &str); 6] = [
+        (&["run", "measured.toml", "--json", "-q"], "run", "/cases/0/steps/2/figures/metrics/values/faces"),
+        (&["run", "recipe.toml", "--json", "-q", "--set", "limit=2"], "run", "/cases/0/gates/0/rows/1/measured"),
+        (&["measure", "cube.obj", "--json"], "measure", "/metrics/volume"),
+        (&["diff", "cube.obj", "other.obj", "--json"], "mesh-diff", "/metrics/0/after"),
+        (&["diff", "a", "b", "--json"], "diff", "/steps/0/metrics/0/after"),
+        (&["sweep", "recipe.toml", "-s", "limit=0.1,2", "--json", "-q"], "sweep", "/rows/1/values/0"),
+    ];
+    for (arguments, kind, number) in commands {
+        let output = desk.meshmill(arguments).output().unwrap().stdout;
+        let document: serde_json::Value = serde_json::from_slice(&output).unwrap();
+        assert_eq!(document["kind"], kind);
+        let wrong: Vec<String> = schema.iter_errors(&document).map(|e| format!("{}: {e}", e.instance_path())).collect();
+        assert_eq!(wrong, [""; 0], "{arguments:?}");
+        let value = document.pointer(number);
+        assert!(value.is_some_and(serde_json::Value::is_number), "{arguments:?}: {number} is {value:?} in {document}");
+        assert!(document["units"].as_object().is_some_and(|units| kind == "diff" || units.len() < 60), "{arguments:?}");
+    }
+}
+
+#[test]
+fn names_from_files_do_not_steer_the_terminal() {
+    let desk = Desk::new();
+    let named = CUBE.replacen("f ", "g \u{1b}[31mlid\u{202e}\nf ", 1);
+    fs::write(desk.path("named.obj"), &named).unwrap();
+    let text = fs::read_to_string(desk.path("recipe.toml")).unwrap().replace("cube.obj", "named.obj");
+    fs::write(desk.path("named.toml"), text.replace("result.vtu", "result.csv")).unwrap();
+    let commands: [&[&str]; 4] = [
+        &["convert", "named.obj", "named.csv"],
+        &["measure", "named.obj"],
+        &["run", "named.toml", "--report", "--out", "o"],
+        &["run", "recipe.toml", "--set", "\u{1b}[31m=\u{202e}"],
+    ];
+    for arguments in commands {
+        let output = desk.meshmill(arguments).output().unwrap();
+        let said = [output.stdout, output.stderr].concat();
+        let said = String::from_utf8(said).unwrap();
+        assert!(!said.contains("\u{1b}[31mlid") && !said.contains('\u{202e}'), "{arguments:?}: {said}");
+    }
+    let page = fs::read_to_string(desk.path("o/report.html")).unwrap();
+    assert!(page.contains("face groups") && !page.contains('\u{202e}'), "a name turns the page's direction of writing");
+}
+
+#[test]
 fn plan_tells_why_a_task_has_to_run() {
     let desk = Desk::new();
     let new = desk.meshmill(&["plan", "recipe.toml"]).assert().success();

@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 
 use meshmill::format::Format;
 use meshmill::plan::{CHECK_KEYS, ELEMENTS, METRIC_ENDINGS, OUTPUT_KEYS};
+use meshmill::report::json;
 use meshmill::schema::{nested_tables, recipe_schema, recipe_schema_text, steps_reference};
 use meshmill::step::parameters::ParameterSchema;
 use meshmill::steps::CATALOG;
@@ -34,6 +35,12 @@ fn compare(file: &str, generated: &str) {
 #[test]
 fn schema_is_up_to_date() {
     compare("schemas/recipe.schema.json", &recipe_schema_text(CATALOG, &endings()));
+}
+
+#[test]
+fn the_schema_of_what_is_printed_is_up_to_date() {
+    assert!(jsonschema::draft7::meta::is_valid(&json::schema()));
+    compare("schemas/output.schema.json", &json::schema_text());
 }
 
 #[test]

@@ -5,10 +5,11 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::convert::read_mesh;
-use super::exit::{Exit, Fault, data};
+use super::exit::{Exit, Fault, data, document_text};
 use super::signals::Interrupt;
 use crate::metric::measure;
-use crate::report::diff::{RunRecord, diff, metrics_text, text};
+use crate::report::diff::{MeshDiff, MetricChange, RunRecord, diff, metrics_text, text};
+use crate::report::json::Kind;
 use crate::run::Silent;
 use crate::watch::Watch;
 
@@ -43,12 +44,8 @@ fn record_file(path: &Path) -> Option<PathBuf> {
 
 fn runs(before: &Path, after: &Path, json: bool) -> Result<Exit, Fault> {
     let found = diff(&read(before)?, &read(after)?);
-    data(&if json { to_json(&found)? } else { text(&found) });
+    data(&if json { document_text(Kind::Diff, &found)? } else { text(&found) });
     Ok(Exit::Done)
-}
-
-fn to_json(value: &impl serde::Serialize) -> Result<String, Fault> {
-    serde_json::to_string_pretty(value).map_err(|error| Fault::new(Exit::Fault, format!("cannot write: {error}")))
 }
 
 fn read(path: &Path) -> Result<RunRecord, Fault> {
@@ -69,8 +66,10 @@ fn meshes(arguments: &Arguments) -> Result<Exit, Fault> {
         return Ok(interrupt.exit());
     };
     let names = crate::metric::registry::METRICS.iter().map(|metric| metric.name);
-    let rows: Vec<_> = names.map(|name| (name.to_owned(), a.get(name), b.get(name))).collect();
-    let rows: Vec<_> = rows.into_iter().filter(|(_, a, b)| a.is_some() || b.is_some()).collect();
-    data(&if arguments.json { to_json(&rows)? } else { metrics_text(&rows) });
+    let change = |name: &str| MetricChange { metric: name.to_owned(), before: a.get(name), after: b.get(name) };
+    let metrics = names.map(change).filter(|change| change.before.is_some() || change.after.is_some()).collect();
+    let found = MeshDiff { metrics };
+    let text = if arguments.json { document_text(Kind::MeshDiff, &found)? } else { metrics_text(&found.metrics) };
+    data(&text);
     Ok(Exit::Done)
 }

@@ -6,10 +6,12 @@ use std::sync::OnceLock;
 
 use crate::recipe::Diagnostics;
 use crate::report::Status;
+use crate::report::json::{self, Kind};
 use crate::run::RunError;
 use crate::step::StepFailure;
 use crate::step::failure::without_code;
 use crate::store::StoreError;
+use crate::terminal::printable_lines;
 
 /// The exit codes of the command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -93,11 +95,17 @@ impl Fault {
     /// Writes the fault to stderr.
     pub(super) fn print(&self) {
         if self.rendered {
-            say(&self.message);
+            say_styled(&self.message);
         } else {
             say_error(&self.message, self.help.as_deref());
         }
     }
+}
+
+/// A document for programs as text.
+pub(super) fn document_text(kind: Kind, content: &impl serde::Serialize) -> Result<String, Fault> {
+    let text = json::document(kind, content).and_then(|document| serde_json::to_string_pretty(&document));
+    text.map_err(|error| Fault::new(Exit::Fault, format!("cannot write JSON: {error}")))
 }
 
 impl From<Diagnostics> for Fault {
@@ -136,6 +144,11 @@ impl From<RunError> for Fault {
 
 /// A line to stderr. Nobody may be listening, which is no error.
 pub(super) fn say(text: &str) {
+    say_styled(&printable_lines(text));
+}
+
+/// The same for text with colours of ours.
+pub(super) fn say_styled(text: &str) {
     let _ = writeln!(anstream::stderr(), "{text}");
 }
 
@@ -161,12 +174,12 @@ pub(super) fn unwritten() -> Option<Fault> {
 /// A text with its failures in red; the stream strips colours where the terminal takes none.
 pub(super) fn coloured(text: &str) -> String {
     let red = anstyle::AnsiColor::Red.on_default().bold();
-    text.replace("FAILED", &format!("{red}FAILED{red:#}"))
+    printable_lines(text).replace("FAILED", &format!("{red}FAILED{red:#}"))
 }
 
 fn say_error(message: &str, help: Option<&str>) {
     let red = anstyle::AnsiColor::Red.on_default().bold();
-    say(&format!("{red}error{red:#}: {message}"));
+    say_styled(&format!("{red}error{red:#}: {}", printable_lines(message)));
     if let Some(help) = help {
         say(&format!("  try: {help}"));
     }

@@ -3,10 +3,10 @@
 use std::path::PathBuf;
 
 use super::convert::read_mesh;
-use super::exit::{Exit, Fault, data};
+use super::exit::{Exit, Fault, data, document_text};
 use super::signals::Interrupt;
 use crate::metric::measure;
-use crate::report::measure::flat;
+use crate::report::json::{Kind, Measured};
 use crate::report::table;
 use crate::run::Silent;
 use crate::watch::Watch;
@@ -37,7 +37,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Fault> {
     };
     let fault = |error: String| Fault::new(Exit::Fault, format!("cannot write the metrics: {error}"));
     if arguments.json {
-        data(&serde_json::to_string_pretty(&flat(&metrics)).map_err(|error| fault(error.to_string()))?);
+        data(&document_text(Kind::Measure, &Measured { metrics: metrics.values })?);
     } else if arguments.ron {
         let config = ron::ser::PrettyConfig::default();
         data(&ron::ser::to_string_pretty(&metrics, config).map_err(|error| fault(error.to_string()))?);

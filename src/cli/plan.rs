@@ -70,7 +70,7 @@ fn to_text(plan: &Plan, forecasts: &[Forecast]) -> String {
         let node = plan.node(id);
         let words = words(plan, forecast);
         runs += usize::from(!matches!(forecast, Forecast::Source | Forecast::Cached(_)));
-        rows.add_row([node.label.clone(), kind(&node.task).to_owned(), words]);
+        table::add(&mut rows, [node.label.clone(), kind(&node.task).to_owned(), words]);
     }
     let tasks = plan.order().filter(|id| !matches!(plan.node(*id).task, Task::Source(_))).count();
     format!("{}\n\n{runs} of {tasks} tasks to run", table::text(&rows))
@@ -98,7 +98,7 @@ fn keys(plan: &Plan, explained: &[Explained], steps: &[String], json: bool) -> S
         }
         let mut table = table::plain(&["", "field", "before", "now"]);
         for row in rows {
-            table.add_row(row);
+            table::add(&mut table, row);
         }
         parts.push(format!("{label}: {why}\n{}", table::text(&table)));
     }

@@ -7,10 +7,11 @@ use std::time::{Duration, Instant};
 
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-use super::exit::{coloured, say};
+use super::exit::{coloured, say, say_styled};
 use crate::report::table::figures_text;
 use crate::run::{Event, Observer, Silent, TaskState};
 use crate::store::{Entry, Outcome};
+use crate::terminal::printable_lines;
 
 /// With `-v` off a terminal, a running task says where it is this often.
 const INTERVAL: Duration = Duration::from_secs(5);
@@ -81,7 +82,7 @@ impl Observer for Bars {
                 if let Some(line) = end_line(label, state, entry, self.verbose) {
                     let plain = anstream::stderr().current_choice() == anstream::ColorChoice::Never;
                     // A terminal that went away is no reason to stop.
-                    let _ = self.all.println(if plain { line } else { coloured(&line) });
+                    let _ = self.all.println(if plain { printable_lines(&line).into_owned() } else { coloured(&line) });
                 }
             }
             Event::Phase { node, name, total } => {
@@ -137,7 +138,7 @@ impl Observer for Lines {
             Event::State { node, label, state, entry } => {
                 running.remove(&node);
                 if let Some(line) = end_line(label, state, entry, self.verbose) {
-                    say(&coloured(&line));
+                    say_styled(&coloured(&line));
                 }
             }
             Event::Phase { node, name, total } => {

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use super::Global;
 use super::context::{Planned, RecipeArguments, open_store, protected};
-use super::exit::{Exit, Fault, coloured, data, say, say_failure};
+use super::exit::{Exit, Fault, coloured, data, document_text, say, say_failure};
 use super::lock::Held;
 use super::picture::{self, Pictures};
 use super::progress;
@@ -15,6 +15,7 @@ use super::report;
 use super::signals::Interrupt;
 use super::trace::Trace;
 use super::unchanged::Unchanged;
+use crate::report::json::Kind;
 use crate::report::{Report, Status, record, table};
 use crate::run::{self, Observer, RunError, RunOptions, RunOutcome};
 use crate::store::Store;
@@ -235,8 +236,7 @@ pub(super) fn record_text(report: &Report) -> Result<String, Fault> {
 
 pub(super) fn tell(report: &Report, json: bool, quiet: bool) -> Result<(), Fault> {
     if json {
-        let text = serde_json::to_string_pretty(report);
-        data(&text.map_err(|error| Fault::new(Exit::Fault, format!("cannot write the report: {error}")))?);
+        data(&document_text(Kind::Run, report)?);
     } else if !quiet {
         data(&coloured(&table::report(report)));
     }

@@ -1,16 +1,34 @@
-//! `meshmill schema`: the JSON Schema of recipes, for editors.
+//! `meshmill schema`: JSON Schemas, for editors and for programs that read what this one prints.
 
 use super::context::endings;
 use super::exit::{Exit, Fault, data};
+use crate::report::json;
 use crate::schema::recipe_schema_text;
 use crate::steps::CATALOG;
 
-/// Print the JSON Schema of recipes.
+/// Print a JSON Schema: of recipes, for editors, or of what `--json` prints.
 #[derive(Debug, clap::Args)]
-pub(super) struct Arguments {}
+pub(super) struct Arguments {
+    /// Which one.
+    #[arg(value_enum, default_value_t)]
+    of: Of,
+}
+
+#[derive(Clone, Copy, Debug, Default, clap::ValueEnum)]
+enum Of {
+    /// Recipes.
+    #[default]
+    Recipe,
+    /// What `run`, `measure`, `diff` and `sweep` print with `--json`.
+    Output,
+}
 
 #[expect(clippy::unnecessary_wraps, reason = "every subcommand has this form")]
-pub(super) fn run(_arguments: &Arguments) -> Result<Exit, Fault> {
-    data(recipe_schema_text(CATALOG, &endings()).trim_end());
+pub(super) fn run(arguments: &Arguments) -> Result<Exit, Fault> {
+    let text = match arguments.of {
+        Of::Recipe => recipe_schema_text(CATALOG, &endings()),
+        Of::Output => json::schema_text(),
+    };
+    data(text.trim_end());
     Ok(Exit::Done)
 }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::Global;
 use super::context::{Planned, RecipeArguments, list_files, open_store, pair, plan_cases, protected};
-use super::exit::{Exit, Fault, data, say};
+use super::exit::{Exit, Fault, data, document_text, say};
 use super::picture::{self, Pictures};
 use super::run::{folder, jobs_of, traced, write_record};
 use super::signals::Interrupt;
@@ -14,6 +14,7 @@ use super::{goal, progress, report};
 use crate::plan::sweep::sweep;
 use crate::recipe::Recipe;
 use crate::report::Report;
+use crate::report::json::Kind;
 use crate::report::sweep::{RowState, SweepTable};
 use crate::run::{self, RunOptions};
 use crate::store::stamp::Said;
@@ -167,7 +168,7 @@ fn fault(error: &dyn std::fmt::Display) -> Fault {
 /// The table in the form asked for.
 pub(super) fn table_text(table: &SweepTable, arguments: &Arguments, quiet: bool) -> Result<String, Fault> {
     Ok(if arguments.json {
-        serde_json::to_string_pretty(table).map_err(|error| fault(&error))?
+        document_text(Kind::Sweep, table)?
     } else if arguments.csv {
         to_csv(table)?.trim_end().to_owned()
     } else if quiet {

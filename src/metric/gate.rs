@@ -51,7 +51,7 @@ pub struct Check {
 }
 
 /// An element that fails a check.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct Fault {
     /// What sort of element.
     pub kind: FaultKind,
@@ -64,7 +64,7 @@ pub struct Fault {
 }
 
 /// What sort of element is at fault.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum FaultKind {
     /// A face of the mesh.
@@ -76,7 +76,7 @@ pub enum FaultKind {
 }
 
 /// The outcome of one check.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct GateRow {
     /// The metric's name.
     pub metric: String,

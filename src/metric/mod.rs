@@ -25,7 +25,7 @@ use crate::mesh::Soup;
 use crate::watch::{Cancelled, Watch};
 
 /// A table of metrics by name, in kebab-case (`min-stretch`). Values are numbers, flags, or absent where undefined.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct Measurement {
     /// Values by metric name.
     pub values: BTreeMap<String, Value>,
@@ -42,6 +42,17 @@ pub enum Value {
     Number(f64),
     /// A property that holds or not.
     Flag(bool),
+}
+
+/// As `--json` shows it: a number, a truth value, or null where a number is not finite.
+impl schemars::JsonSchema for Value {
+    fn schema_name() -> std::borrow::Cow<'static, str> {
+        "Value".into()
+    }
+
+    fn json_schema(_generator: &mut schemars::SchemaGenerator) -> schemars::Schema {
+        schemars::json_schema!({ "type": ["number", "boolean", "null"] })
+    }
 }
 
 impl Value {

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use annotate_snippets::{AnnotationKind, Group, Level, Origin, Renderer, Snippet};
 
 use super::source::{SourceFile, SourceMap, Span};
+use crate::terminal::printable_lines;
 
 /// More than this many problems are counted, not shown; a reader mends the first ones and tries again.
 const SHOWN: usize = 50;
@@ -135,7 +136,7 @@ fn render_one(diagnostic: &Diagnostic, sources: &SourceMap, renderer: &Renderer)
         Severity::Error => Level::ERROR,
         Severity::Warning => Level::WARNING,
     };
-    let message = printable(&diagnostic.message);
+    let message = shown(&diagnostic.message);
     let mut group = Group::with_title(level.primary_title(message));
     let mut labels = diagnostic.labels.as_slice();
     let mut primary = true;
@@ -150,7 +151,7 @@ fn render_one(diagnostic: &Diagnostic, sources: &SourceMap, renderer: &Renderer)
         primary = false;
     }
     if let Some(help) = &diagnostic.help {
-        group = group.element(Level::HELP.message(printable(help)));
+        group = group.element(Level::HELP.message(shown(help)));
     }
     renderer.render(&[group])
 }
@@ -208,10 +209,8 @@ fn window(text: &str, at: usize, line_start: usize, line_end: usize) -> std::ops
 }
 
 /// A message fit for a terminal: what the recipe contains may be long or hold control characters.
-fn printable(message: &str) -> String {
-    let mut short: String = message.chars().filter(|c| *c == '\n' || !c.is_control()).take(600).collect();
-    if short.len() < message.len() && message.chars().count() > 600 {
-        short.push('…');
-    }
-    short
+fn shown(message: &str) -> String {
+    let short: String = message.chars().take(600).collect();
+    let more = if short.len() < message.len() { "…" } else { "" };
+    format!("{}{more}", printable_lines(&short))
 }

@@ -56,7 +56,7 @@ impl RunRecord {
 }
 
 /// What differs between two runs.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct RunDiff {
     /// Versions, names, parameters and input files that differ: what, before, after.
     pub head: Vec<[String; 3]>,
@@ -64,8 +64,15 @@ pub struct RunDiff {
     pub steps: Vec<StepDiff>,
 }
 
+/// Two meshes side by side.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, schemars::JsonSchema)]
+pub struct MeshDiff {
+    /// Every metric that is defined on one of them.
+    pub metrics: Vec<MetricChange>,
+}
+
 /// What differs in one step.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct StepDiff {
     /// Its name, with the case before it in a sweep.
     pub step: String,
@@ -75,10 +82,32 @@ pub struct StepDiff {
     pub upstream: Vec<String>,
     /// Whether its result has other bytes.
     pub other_result: bool,
-    /// Metrics that differ: name, before, after.
-    pub metrics: Vec<(String, Option<Value>, Option<Value>)>,
-    /// Gates whose verdict differs: metric, before, after.
-    pub verdicts: Vec<(String, bool, bool)>,
+    /// Metrics that differ.
+    pub metrics: Vec<MetricChange>,
+    /// Gates whose verdict differs.
+    pub verdicts: Vec<VerdictChange>,
+}
+
+/// A metric of two meshes.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, schemars::JsonSchema)]
+pub struct MetricChange {
+    /// Its name in the registry.
+    pub metric: String,
+    /// The value before; absent where undefined.
+    pub before: Option<Value>,
+    /// The value after.
+    pub after: Option<Value>,
+}
+
+/// The verdict of a gate in two runs.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, schemars::JsonSchema)]
+pub struct VerdictChange {
+    /// The metric that it judges.
+    pub metric: String,
+    /// Whether it held before.
+    pub before: bool,
+    /// Whether it holds after.
+    pub after: bool,
 }
 
 /// Compares two runs.
@@ -138,9 +167,9 @@ fn steps(before: &CaseRecord, now: &CaseRecord) -> Vec<StepDiff> {
                 let metrics = |step: &StepRecord| step.figures.as_ref().map(metrics).unwrap_or_default();
                 let (a, b) = (metrics(earlier), metrics(step));
                 for name in union(&a, &b) {
-                    let (a, b) = (a.get(name).copied(), b.get(name).copied());
-                    if a != b {
-                        diff.metrics.push((name.clone(), a, b));
+                    let (before, after) = (a.get(name).copied(), b.get(name).copied());
+                    if before != after {
+                        diff.metrics.push(MetricChange { metric: name.clone(), before, after });
                     }
                 }
             }
@@ -168,14 +197,17 @@ fn causes(before: &StepRecord, now: &StepRecord, diff: &mut StepDiff) {
     }
 }
 
-fn verdicts(before: &CaseRecord, now: &CaseRecord, step: &str) -> Vec<(String, bool, bool)> {
+fn verdicts(before: &CaseRecord, now: &CaseRecord, step: &str) -> Vec<VerdictChange> {
     let rows = |case: &CaseRecord| -> BTreeMap<String, bool> {
         let gates = case.gates.iter().filter(|gate| gate.step == step);
         gates.flat_map(|gate| gate.rows.iter().map(|row| (row.metric.clone(), row.passed))).collect()
     };
     let (before, now) = (rows(before), rows(now));
-    let both = now.into_iter().filter_map(|(metric, now)| Some((*before.get(&metric)?, metric, now)));
-    both.filter(|(before, _, now)| before != now).map(|(before, metric, now)| (metric, before, now)).collect()
+    let both = now.into_iter().filter_map(|(metric, after)| {
+        let before = *before.get(&metric)?;
+        Some(VerdictChange { metric, before, after })
+    });
+    both.filter(|verdict| verdict.before != verdict.after).collect()
 }
 
 fn short(hash: &str) -> String {
@@ -188,7 +220,7 @@ pub fn text(diff: &RunDiff) -> String {
     if !diff.head.is_empty() {
         let mut rows = table::plain(&["what", "before", "after"]);
         for line in &diff.head {
-            rows.add_row(line.clone());
+            table::add(&mut rows, line.clone());
         }
         parts.push(table::text(&rows));
     }
@@ -206,8 +238,9 @@ pub fn text(diff: &RunDiff) -> String {
         {
             lines.push("  its result is the same".to_owned());
         }
-        lines.extend(step.verdicts.iter().map(|(metric, _, now)| {
-            format!("  gate {metric}: {}", if *now { "failed before, holds now" } else { "held before, FAILS now" })
+        lines.extend(step.verdicts.iter().map(|verdict| {
+            let change = if verdict.after { "failed before, holds now" } else { "held before, FAILS now" };
+            format!("  gate {}: {change}", verdict.metric)
         }));
         if !step.metrics.is_empty() {
             let changed = metrics_text(&step.metrics);
@@ -219,11 +252,11 @@ pub fn text(diff: &RunDiff) -> String {
 }
 
 /// Metrics side by side, with the change in percent.
-pub fn metrics_text(metrics: &[(String, Option<Value>, Option<Value>)]) -> String {
+pub fn metrics_text(metrics: &[MetricChange]) -> String {
     let mut rows = table::plain(&["metric", "before", "after", "change"]);
-    for (name, before, now) in metrics {
+    for MetricChange { metric, before, after } in metrics {
         let text = |value: &Option<Value>| value.as_ref().map_or_else(|| "undefined".to_owned(), value_text);
-        rows.add_row([name.clone(), text(before), text(now), change(*before, *now)]);
+        table::add(&mut rows, [metric.clone(), text(before), text(after), change(*before, *after)]);
     }
     table::align(&mut rows, &[1, 2, 3]);
     table::text(&rows)

@@ -25,7 +25,7 @@ pub fn value_text(value: &Value) -> String {
     }
 }
 
-fn unit_text(unit: Unit) -> &'static str {
+pub(super) fn unit_text(unit: Unit) -> &'static str {
     match unit {
         Unit::Length => "length",
         Unit::Area => "area",
@@ -33,48 +33,5 @@ fn unit_text(unit: Unit) -> &'static str {
         Unit::Degrees => "degrees",
         Unit::Share => "share",
         Unit::Ratio | Unit::Count | Unit::Flag => "",
-    }
-}
-
-/// A table of metrics as programs read it: `metrics` holds numbers and booleans by name, `units` the unit of each that
-/// has one (`length`, `area`, `volume`, `degrees`, `share`). Numbers that are not finite are null.
-pub fn flat(measurement: &Measurement) -> serde_json::Value {
-    let mut metrics = serde_json::Map::new();
-    let mut units = serde_json::Map::new();
-    for (name, value) in &measurement.values {
-        let value = match *value {
-            Value::Count(count) => count.into(),
-            Value::Integer(number) => number.into(),
-            Value::Number(number) => number.into(),
-            Value::Flag(flag) => flag.into(),
-        };
-        metrics.insert(name.clone(), value);
-        if let Some(unit) = METRICS.iter().find(|metric| metric.name == name).map(|metric| unit_text(metric.unit))
-            && !unit.is_empty()
-        {
-            units.insert(name.clone(), unit.into());
-        }
-    }
-    serde_json::json!({ "metrics": metrics, "units": units })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_flat_form_has_numbers_and_booleans_with_units_beside_them() {
-        let values = [
-            ("faces", Value::Count(12)),
-            ("closed", Value::Flag(true)),
-            ("area", Value::Number(6.5)),
-            ("euler-characteristic", Value::Integer(-2)),
-        ];
-        let values = values.map(|(name, value)| (name.to_owned(), value)).into();
-        let expected = serde_json::json!({
-            "metrics": { "area": 6.5, "closed": true, "euler-characteristic": -2, "faces": 12 },
-            "units": { "area": "area" },
-        });
-        assert_eq!(flat(&Measurement { values }), expected);
     }
 }

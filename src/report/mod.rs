@@ -4,6 +4,7 @@
 //! repeats from run to run stands apart from `timings`, which does not.
 
 pub mod diff;
+pub mod json;
 pub mod lock;
 pub mod measure;
 pub mod page;
@@ -26,7 +27,7 @@ use crate::run::{
 use crate::step::StepFailure;
 
 /// How a run ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Status {
     /// Everything was made and every gate holds.
@@ -44,7 +45,7 @@ pub enum Status {
 }
 
 /// A run, for people and programs.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct Report {
     /// Version of the program.
     pub meshmill: String,
@@ -67,7 +68,7 @@ pub struct Report {
 }
 
 /// One case of a run.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct CaseReport {
     /// Its name; empty for a plain run.
     pub name: String,
@@ -82,7 +83,7 @@ pub struct CaseReport {
 }
 
 /// One step of a case.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct StepReport {
     /// Its name in the recipe, with `.OUTPUT` for a further output.
     pub name: String,
@@ -109,7 +110,7 @@ pub struct StepReport {
 }
 
 /// The checks of one step.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct GateSection {
     /// The step as the recipe names it.
     pub step: String,
@@ -125,7 +126,7 @@ pub struct GateSection {
 }
 
 /// An output file.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct FileReport {
     /// Where it is.
     pub path: String,
@@ -146,7 +147,7 @@ pub struct FileReport {
 }
 
 /// What differs from run to run.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct Timings {
     /// Seconds of the run.
     pub total: f64,

@@ -14,7 +14,7 @@ use crate::metric::registry::{self, Direction, MetricDef};
 use crate::run::{Case, Plan, RunOutcome, Task, TaskState};
 
 /// A sweep.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct SweepTable {
     /// Name of the recipe.
     pub recipe: String,
@@ -27,7 +27,7 @@ pub struct SweepTable {
 }
 
 /// Something that was measured of every case.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct SweepColumn {
     /// `STEP.METRIC`; in a file with `gate ` before it where it belongs to a gate.
     pub name: String,
@@ -42,7 +42,7 @@ pub struct SweepColumn {
 }
 
 /// Which values of a column are good.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Better {
     /// Large ones.
@@ -54,7 +54,7 @@ pub enum Better {
 }
 
 /// What became of a case.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum RowState {
     /// It has a result, and every gate holds.
@@ -68,7 +68,7 @@ pub enum RowState {
 }
 
 /// A case of a sweep.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct SweepRow {
     /// Its name, and the folder of its files.
     pub case: String,
@@ -157,7 +157,7 @@ impl SweepTable {
             let mut cells = row.parameters.clone();
             cells.extend(shown.iter().map(|index| row.values[*index].as_ref().map(value_text).unwrap_or_default()));
             cells.extend([row.state.text().to_owned(), row.case.clone()]);
-            rows.add_row(cells);
+            table::add(&mut rows, cells);
         }
         let numbers: Vec<usize> = (0..self.parameters.len() + shown.len()).collect();
         table::align(&mut rows, &numbers);

@@ -5,9 +5,10 @@ use std::fmt::Write;
 use comfy_table::{CellAlignment, Table};
 
 use super::measure::{number_text, rows, value_text};
-use super::{CaseReport, Report, in_case};
+use super::{CaseReport, FileReport, Report, in_case};
 use crate::metric::Measurement;
 use crate::run::{Figures, FileState, TaskState};
+use crate::terminal::printable;
 
 /// The whole report: steps, metrics, gates and files of every case.
 pub fn report(report: &Report) -> String {
@@ -35,7 +36,7 @@ pub fn report(report: &Report) -> String {
 pub fn measurement(metrics: &Measurement) -> String {
     let mut table = plain(&[]);
     for [name, value, unit] in rows(metrics) {
-        table.add_row([name, value, unit]);
+        add(&mut table, [name, value, unit]);
     }
     align(&mut table, &[1]);
     text(&table)
@@ -48,15 +49,18 @@ fn steps(case: &CaseReport, report: &Report) -> String {
             report.timings.tasks.get(&in_case(&case.name, &step.name)).copied().unwrap_or((TaskState::Cached, 0.0));
         let figures = step.figures.clone().unwrap_or_default();
         let seconds = if step.figures.is_some() { format!("{seconds:.2}") } else { String::new() };
-        table.add_row([
-            step.name.clone(),
-            step.kind.clone(),
-            state_text(state).to_owned(),
-            seconds,
-            figures.faces.map(grouped).unwrap_or_default(),
-            figures.min_stretch.map(|value| format!("{value:.3}")).unwrap_or_default(),
-            figures.mean_stretch.map(|value| format!("{value:.3}")).unwrap_or_default(),
-        ]);
+        add(
+            &mut table,
+            [
+                step.name.clone(),
+                step.kind.clone(),
+                state_text(state).to_owned(),
+                seconds,
+                figures.faces.map(grouped).unwrap_or_default(),
+                figures.min_stretch.map(|value| format!("{value:.3}")).unwrap_or_default(),
+                figures.mean_stretch.map(|value| format!("{value:.3}")).unwrap_or_default(),
+            ],
+        );
     }
     align(&mut table, &[3, 4, 5, 6]);
     text(&table)
@@ -75,10 +79,10 @@ fn gates(case: &CaseReport) -> String {
                 let _ = write!(verdict, " ({note})");
             }
             let measured = row.measured.as_ref().map_or_else(|| "undefined".to_owned(), value_text);
-            table.add_row([gate.step.clone(), row.metric.clone(), row.limit.clone(), measured, verdict]);
+            add(&mut table, [gate.step.clone(), row.metric.clone(), row.limit.clone(), measured, verdict]);
         }
         if gate.passed.is_none() {
-            table.add_row([gate.step.as_str(), "", "", "", "not decided"]);
+            add(&mut table, [gate.step.as_str(), "", "", "", "not decided"]);
         }
     }
     align(&mut table, &[3]);
@@ -93,12 +97,17 @@ fn files(case: &CaseReport, report: &Report) -> String {
             (Some(FileState::Written), _) => "written",
             (Some(FileState::Missing) | None, _) => "not written",
         };
-        let lost = (!file.lost.is_empty()).then(|| format!("without {}", file.lost.join(", ")));
-        let said: Vec<String> = file.note.iter().cloned().chain(lost).collect();
-        let said = if said.is_empty() { String::new() } else { format!(" ({})", said.join("; ")) };
-        table.add_row([file.path.as_str(), file.step.as_str(), &format!("{state}{said}")]);
+        let said = file_notes(file);
+        let said = if said.is_empty() { said } else { format!(" ({said})") };
+        add(&mut table, [file.path.as_str(), file.step.as_str(), &format!("{state}{said}")]);
     }
     text(&table)
+}
+
+/// What there is to say of a file: how it was written, and without what.
+pub fn file_notes(file: &FileReport) -> String {
+    let lost = (!file.lost.is_empty()).then(|| format!("without {}", file.lost.join(", ")));
+    file.note.iter().cloned().chain(lost).collect::<Vec<_>>().join("; ")
 }
 
 /// What a state is called in tables.
@@ -152,6 +161,11 @@ pub fn plain(header: &[&str]) -> Table {
         table.set_header(header);
     }
     table
+}
+
+/// Adds a row to a table. What stands in it may be a name from a file, and is made fit to be shown.
+pub fn add<T: AsRef<str>>(table: &mut Table, cells: impl IntoIterator<Item = T>) {
+    table.add_row(cells.into_iter().map(|cell| printable(cell.as_ref()).into_owned()));
 }
 
 /// The table as text, without blanks at the ends of lines.

@@ -6,7 +6,7 @@ use super::observe::{Event, Observer};
 use crate::store::Entry;
 
 /// Where a node is on its way.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum TaskState {
     /// Its inputs are not known yet.

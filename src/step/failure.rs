@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use crate::watch::Cancelled;
 
 /// What sort of failure, which decides the exit code.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum FailureKind {
     /// The input file is wrong: exit code 2.
@@ -22,18 +22,19 @@ pub enum FailureKind {
 }
 
 /// An element of a mesh that a message is about.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct ElementRef {
     /// `vertex`, `edge`, `face`, `line` or `byte`.
     pub kind: String,
     /// Its number in the mesh or file.
     pub id: u64,
     /// Where it is, in model coordinates.
+    #[schemars(with = "Option<[f64; 3]>")]
     pub at: Option<DVec3>,
 }
 
 /// A step's failure as the rest of the program sees it.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct StepFailure {
     /// What sort.
     pub kind: FailureKind,

@@ -11,7 +11,7 @@ use super::seal::{self, SealError};
 use crate::metric::Measurement;
 
 /// Numbers of an artifact for progress, tables and run records.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct Figures {
     /// Port type of the artifact.
     pub port: String,

@@ -35,6 +35,7 @@ use super::picture::ramp;
 use super::sweep::SweepTable;
 use crate::metric::Measurement;
 use crate::step::Artifact;
+use crate::terminal::steers;
 
 /// Faces of a mesh that are shown before it is thinned.
 pub const MOST_FACES: usize = 100_000;
@@ -123,7 +124,8 @@ pub fn html(
         reference => chosen.reference,
         quality => chart::stops(&ramp::QUALITY),
     })?;
-    Ok(page)
+    // What turns the direction of writing comes from names in files; it may stand in the text and in the data.
+    Ok(page.replace(|letter: char| steers(letter) && !letter.is_control(), "\u{fffd}"))
 }
 
 /// The templates of the page.

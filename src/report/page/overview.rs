@@ -9,7 +9,7 @@ use super::text::{anchor, digits, seconds, short, unit, value};
 use crate::metric::Value;
 use crate::metric::gate::{Fault, FaultKind, GateRow};
 use crate::metric::registry::{self, Direction};
-use crate::report::table::{grouped, state_text};
+use crate::report::table::{file_notes, grouped, state_text};
 use crate::report::{CaseReport, Report, Status, in_case};
 use crate::run::{FileState, TaskState};
 
@@ -329,7 +329,8 @@ pub(super) struct FileView {
     state: &'static str,
     class: &'static str,
     hash: String,
-    failure: String,
+    /// Why it was not written, or what it lacks.
+    said: String,
 }
 
 /// The files that were written.
@@ -347,7 +348,7 @@ pub(super) fn files(report: &Report, case: &CaseReport) -> Vec<FileView> {
             state,
             class,
             hash: file.content.clone().unwrap_or_default(),
-            failure: file.failure.as_ref().map(|failure| failure.message.clone()).unwrap_or_default(),
+            said: file.failure.as_ref().map_or_else(|| file_notes(file), |failure| failure.message.clone()),
         }
     };
     case.files.iter().map(view).collect()

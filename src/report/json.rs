@@ -1,0 +1,163 @@
+//! `--json`: one shape of document for every command, for programs in any language.
+//!
+//! A document is an object with `kind` (`run`, `measure`, `diff`, `mesh-diff` or `sweep`), `units`, which gives the unit of
+//! each metric in it that has one, and the content of that kind. Measured values are plain numbers and truth values; a
+//! number that is not finite is null. `schemas/output.schema.json`, which `meshmill schema output` prints, is the schema.
+
+use std::collections::BTreeMap;
+
+use schemars::JsonSchema;
+use schemars::generate::SchemaSettings;
+use serde::Serialize;
+use serde_json::{Map, Value as Json, json};
+
+use super::Report;
+use super::diff::{MeshDiff, RunDiff};
+use super::measure::unit_text;
+use super::sweep::SweepTable;
+use crate::metric::Value;
+use crate::metric::registry::find;
+
+/// What a document holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Kind {
+    /// A run: [`Report`].
+    Run,
+    /// The metrics of one mesh: [`Measured`].
+    Measure,
+    /// Two runs: [`RunDiff`].
+    Diff,
+    /// Two meshes: [`MeshDiff`].
+    MeshDiff,
+    /// A sweep: [`SweepTable`].
+    Sweep,
+}
+
+/// The metrics of one mesh.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
+pub struct Measured {
+    /// Values by metric name.
+    pub metrics: BTreeMap<String, Value>,
+}
+
+/// The document of this content.
+///
+/// # Errors
+/// Where the content is no JSON object.
+pub fn document(kind: Kind, content: &impl Serialize) -> serde_json::Result<Json> {
+    let mut content = serde_json::to_value(content)?;
+    let mut units = Map::new();
+    flatten(&mut content, &mut units);
+    let mut document = Map::from_iter([("kind".to_owned(), serde_json::to_value(kind)?)]);
+    document.insert("units".to_owned(), units.into());
+    document.extend(serde_json::from_value::<Map<String, Json>>(content)?);
+    Ok(document.into())
+}
+
+/// Puts values in the place of what the program calls them, and notes the units of the metrics met.
+fn flatten(json: &mut Json, units: &mut Map<String, Json>) {
+    match json {
+        Json::Array(items) => items.iter_mut().for_each(|item| flatten(item, units)),
+        Json::Object(table) => {
+            if let Some(value) = bare_value(table) {
+                *json = value;
+                return;
+            }
+            if let Some(Json::String(metric)) = table.get("metric") {
+                note_unit(metric, units);
+            }
+            for (name, item) in table {
+                flatten(item, units);
+                if !item.is_object() && !item.is_array() {
+                    note_unit(name, units);
+                }
+            }
+        }
+        Json::Null | Json::Bool(_) | Json::Number(_) | Json::String(_) => {}
+    }
+}
+
+/// The value of a [`Value`], which is named by its variant within the program.
+fn bare_value(table: &Map<String, Json>) -> Option<Json> {
+    let mut entries = table.iter();
+    let (Some((name, value)), None) = (entries.next(), entries.next()) else { return None };
+    let is_value = match name.as_str() {
+        "Count" | "Integer" => value.is_i64() || value.is_u64(),
+        "Number" => value.is_number() || value.is_null(),
+        "Flag" => value.is_boolean(),
+        _ => false,
+    };
+    is_value.then(|| value.clone())
+}
+
+fn note_unit(metric: &str, units: &mut Map<String, Json>) {
+    if let Some(unit) = find(metric).map(|metric| unit_text(metric.unit)).filter(|unit| !unit.is_empty()) {
+        units.insert(metric.to_owned(), unit.into());
+    }
+}
+
+/// The schema of all documents, draft 7.
+pub fn schema() -> Json {
+    let settings = SchemaSettings::draft07().for_serialize();
+    let mut generator = settings.into_generator();
+    let contents = [
+        (Kind::Run, generator.subschema_for::<Report>()),
+        (Kind::Measure, generator.subschema_for::<Measured>()),
+        (Kind::Diff, generator.subschema_for::<RunDiff>()),
+        (Kind::MeshDiff, generator.subschema_for::<MeshDiff>()),
+        (Kind::Sweep, generator.subschema_for::<SweepTable>()),
+    ];
+    let envelope = |(kind, content): (Kind, schemars::Schema)| {
+        json!({
+            "allOf": [content, {
+                "type": "object",
+                "required": ["kind", "units"],
+                "properties": { "kind": { "const": kind }, "units": { "$ref": "#/definitions/Units" } }
+            }]
+        })
+    };
+    let documents: Vec<Json> = contents.into_iter().map(envelope).collect();
+    let mut definitions = generator.take_definitions(true);
+    let unit = json!({ "enum": ["length", "area", "volume", "degrees", "share"] });
+    definitions.insert("Units".to_owned(), json!({
+        "description": "The unit of each metric of the document that has one. Lengths are in the units of the mesh.",
+        "type": "object",
+        "additionalProperties": unit
+    }));
+    json!({
+        "$schema": "http://json-schema.org/draft-07/schema#",
+        "title": "Output of meshmill --json",
+        "oneOf": documents,
+        "definitions": definitions
+    })
+}
+
+/// The same as text, as it is shipped.
+pub fn schema_text() -> String {
+    // A JSON value is always written.
+    serde_json::to_string_pretty(&schema()).unwrap_or_default() + "\n"
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_are_bare_with_units_beside_them() {
+        let values = [
+            ("faces", Value::Count(12)),
+            ("closed", Value::Flag(true)),
+            ("area", Value::Number(6.5)),
+            ("min-edge", Value::Number(f64::NAN)),
+            ("euler-characteristic", Value::Integer(-2)),
+        ];
+        let metrics = values.map(|(name, value)| (name.to_owned(), value)).into();
+        let expected = json!({
+            "kind": "measure",
+            "metrics": { "area": 6.5, "closed": true, "euler-characteristic": -2, "faces": 12, "min-edge": null },
+            "units": { "area": "area", "min-edge": "length" },
+        });
+        assert_eq!(document(Kind::Measure, &Measured { metrics }).unwrap(), expected);
+    }
+}
