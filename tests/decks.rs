@@ -178,3 +178,146 @@ fn an_element_takes_neither_more_nor_fewer_nodes_than_its_type_has() {
     let beam = format!("{SQUARE}*ELEMENT, TYPE=B31\n2, 1, 2, 4\n");
     assert_eq!(points(Format::Inp, &beam).unwrap().len(), 4, "a beam may name a node for its orientation");
 }
+
+const PART: &str = "*PART, NAME=P\n*NODE, NSET=all\n1, 0, 0, 0\n2, 10, 0, 0\n3, 10, 20, 0\n4, 0, 20, 0\n\
+    *ELEMENT, TYPE=S4, ELSET=skin\n1, 1, 2, 3, 4\n*END PART\n*ASSEMBLY, NAME=A\n";
+
+/// The assembly of these cards: its mesh and what was left out.
+fn assembly(cards: &str) -> Result<(meshmill::mesh::Soup, Vec<String>), String> {
+    let deck = format!("{PART}{cards}*END ASSEMBLY\n");
+    let read = read(Format::Inp, deck.as_bytes(), &Watch::silent());
+    read.map(|(soup, counts)| (soup, counts.left_out())).map_err(|error| error.to_string())
+}
+
+fn names(soup: &meshmill::mesh::Soup) -> Vec<String> {
+    soup.carried.groups.list().map(|(kind, name, size)| format!("{kind} {name} {size}")).collect()
+}
+
+#[test]
+fn an_instance_is_moved_then_turned() {
+    let turned = "*INSTANCE, NAME=P-1, PART=P\n5., 0., 0.\n0.,0.,0., 0.,0.,1., 90.\n*END INSTANCE\n";
+    let (soup, _) = assembly(turned).unwrap();
+    let expected = [[0.0, 5.0, 0.0], [0.0, 15.0, 0.0], [-20.0, 15.0, 0.0], [-20.0, 5.0, 0.0]];
+    is(soup.points.as_slice(), &expected);
+    assert_eq!(names(&soup), ["faces skin 1", "vertices all 4"]);
+    // About an axis elsewhere, not along a coordinate, and by no quarter.
+    let turned = "*INSTANCE, NAME=P-1, PART=p\n0., 0., 1.\n1.,1.,1., 2.,2.,2., 120.\n*END INSTANCE\n";
+    let (soup, _) = assembly(turned).unwrap();
+    is(&soup.points.as_slice()[..2], &[[1.0, 0.0, 0.0], [1.0, 10.0, 0.0]]);
+    for (cards, message) in [
+        ("*INSTANCE, NAME=I, PART=Q\n", "expected a part defined above, found \"Q\""),
+        ("*INSTANCE, NAME=I, PART=P\n1, 2, 3, 4\n", "line 12: expected the end of the line"),
+        ("*INSTANCE, NAME=I, PART=P\n0,0,0\n1,1,1,1,1,1,30\n", "an axis between two points that differ"),
+        ("*INSTANCE, NAME=I, PART=P\n*NODE\n9, 1, 1, 1\n", "*NODE within an instance"),
+        (
+            "*INSTANCE, NAME=I, PART=P\n*END INSTANCE\n*INSTANCE, NAME=i, PART=P\n",
+            "another name than that of an instance",
+        ),
+    ] {
+        let error = assembly(cards).unwrap_err();
+        assert!(error.contains(message), "{cards}: {error}");
+    }
+}
+
+const TWO: &str = "*INSTANCE, NAME=I1, PART=P\n*END INSTANCE\n*INSTANCE, NAME=I2, PART=P\n100.,0.,0.\n*NSET, NSET=own\n1, 2\n\
+    *END INSTANCE\n";
+
+#[test]
+fn each_instance_has_its_own_nodes_and_sets() {
+    let sets = "*NSET, NSET=top, INSTANCE=I2\n4,\n*ELSET, ELSET=both, INSTANCE=I1\n1,\n*ELSET, ELSET=both, INSTANCE=I2\n1,\n\
+        *SURFACE, NAME=face\nI2.skin, SPOS\n*NSET, NSET=corner\nI1.1, I2.3\n";
+    let (soup, left_out) = assembly(&format!("{TWO}{sets}")).unwrap();
+    assert_eq!((soup.points.len(), soup.faces.len(), left_out.len()), (8, 2, 0), "{left_out:?}");
+    assert_eq!(soup.points.as_slice()[6], dvec3(110.0, 20.0, 0.0));
+    let groups = ["faces I1.skin 1", "faces I2.skin 1", "faces both 2", "faces face 1", "vertices I1.all 4"];
+    assert_eq!(names(&soup)[..5], groups);
+    assert_eq!(names(&soup)[5..], ["vertices I2.all 4", "vertices corner 2", "vertices own 2", "vertices top 1"]);
+    let of = |name: &str| soup.carried.groups.vertices[name].iter().map(|v| v.index()).collect::<Vec<_>>();
+    assert_eq!((of("top"), of("own"), of("corner")), (vec![7], vec![4, 5], vec![0, 6]));
+}
+
+#[test]
+fn what_an_assembly_has_besides_its_instances() {
+    let (soup, left_out) = assembly(&format!("{TWO}*ELEMENT, TYPE=CONN3D2\n1, I1.1, I2.2\n")).unwrap();
+    assert_eq!((soup.faces.len(), left_out), (2, vec!["1 elements that are no faces".to_owned()]));
+    let other = "*END ASSEMBLY\n*PART, NAME=spare\n*NODE\n1, 7, 7, 7\n*NSET, NSET=one\n1\n*END PART\n*ASSEMBLY\n";
+    let (soup, left_out) = assembly(&format!("{other}{TWO}")).unwrap();
+    assert_eq!((soup.points.len(), soup.faces.len()), (8, 2));
+    assert_eq!(left_out[0], "part `spare`, which has no instance");
+}
+
+#[test]
+fn instances_without_end_are_refused() {
+    let nodes: Vec<String> = (1..500).map(|i| format!("{i}, {i}, 0, 0\n")).collect();
+    let instances: Vec<String> = (0..2000).map(|i| format!("*INSTANCE, NAME=I{i}, PART=P\n*END INSTANCE\n")).collect();
+    let (part, instances) = (format!("*PART, NAME=P\n*NODE\n{}", nodes.concat()), instances.concat());
+    let error = points(Format::Inp, &format!("{part}*END PART\n{instances}")).unwrap_err();
+    assert!(error.contains("nodes and elements of instances"), "{error}");
+}
+
+/// Two bricks on each other, split so that every kind of volume occurs in one of the decks.
+const BRICKS: &str = "*NODE\n1,0,0,0\n2,1,0,0\n3,1,1,0\n4,0,1,0\n5,0,0,1\n6,1,0,1\n7,1,1,1\n8,0,1,1\n\
+    9,0,0,2\n10,1,0,2\n11,1,1,2\n12,0,1,2\n13,.5,.5,3\n";
+
+/// Volume of the closed surface, and how many faces it has.
+fn volume(deck: &str) -> (f64, usize, Vec<String>) {
+    let (soup, counts) = read(Format::Inp, deck.as_bytes(), &Watch::silent()).expect("a volume mesh");
+    let six: f64 = soup
+        .faces
+        .iter()
+        .flat_map(|face| {
+            let at: Vec<DVec3> = face.corners().iter().map(|&v| soup.points[v]).collect();
+            (1..at.len() - 1).map(|i| at[0].dot(at[i].cross(at[i + 1]))).collect::<Vec<_>>()
+        })
+        .sum();
+    let mut all = names(&soup);
+    all.extend(counts.left_out());
+    (six / 6.0, soup.faces.len(), all)
+}
+
+#[test]
+fn a_mesh_of_volumes_is_its_skin_with_the_sets_as_groups() {
+    let bricks =
+        "*ELEMENT, TYPE=C3D8, ELSET=low\n1, 1,2,3,4,5,6,7,8\n*ELEMENT, TYPE=C3D8R, ELSET=high\n2, 5,6,7,8,9,10,11,12\n";
+    let inside = "the inside of 2 volume elements, of which the mesh is the skin".to_owned();
+    let said = ["faces high 5", "faces low 5", inside.as_str(), "1 nodes of these, and between corners"];
+    let (size, faces, all) = volume(&format!("{BRICKS}{bricks}"));
+    assert_eq!((size, faces, all[..3].to_vec()), (2.0, 10, said[..3].iter().map(|&s| s.to_owned()).collect()));
+    // Two wedges, one of them inside out, and a pyramid on top, whose base is no side of theirs.
+    let wedges = "*ELEMENT, TYPE=C3D6\n1, 1,2,3,5,6,7\n2, 1,4,3,5,8,7\n*ELEMENT, TYPE=C3D5\n3, 5,6,7,8,13\n";
+    let (size, faces, _) = volume(&format!("{BRICKS}{wedges}"));
+    assert!((size - 1.0 - 2.0 / 3.0).abs() < 1e-12 && faces == 8 + 5, "{size} {faces}");
+    let tetrahedra = "*ELEMENT, TYPE=C3D4\n1, 1,2,3,6\n2, 1,3,4,8\n3, 1,6,8,5\n4, 3,8,6,7\n5, 1,3,8,6\n";
+    let (size, faces, _) = volume(&format!("{BRICKS}{tetrahedra}"));
+    assert!((size - 1.0).abs() < 1e-12 && faces == 12, "{size} {faces}");
+}
+
+#[test]
+fn volumes_beside_faces_are_left_out() {
+    let both = "*ELEMENT, TYPE=C3D4\n1, 1,2,3,6\n*ELEMENT, TYPE=S3\n2, 1,2,3\n";
+    let (_, faces, all) = volume(&format!("{BRICKS}{both}"));
+    assert_eq!((faces, all[0].as_str()), (1, "1 elements that are no faces"));
+}
+
+#[test]
+fn solids_of_nastran_are_their_skin_too() {
+    let grids = "GRID,1,,0.,0.,0.\nGRID,2,,1.,0.,0.\nGRID,3,,0.,1.,0.\nGRID,4,,0.,0.,1.\n";
+    let deck = format!("BEGIN BULK\n{grids}CTETRA,1,7,1,2,3,4\nENDDATA\n");
+    let (soup, _) = read(Format::Bdf, deck.as_bytes(), &Watch::silent()).expect("a tetrahedron");
+    assert_eq!((soup.faces.len(), names(&soup)), (4, vec!["faces pid_7 4".to_owned()]));
+}
+
+#[test]
+fn cards_that_nobody_knows_are_named_and_those_of_the_analysis_are_not() {
+    let (_, left_out) =
+        groups("*ELASTIC\n1, 0\n*WOBBLE, BY=2\n1, 2\n*SHELL SECTION, ELSET=skin\n1.\n*WOBBLE\n*STEP\n*ODD\n");
+    assert_eq!(left_out, ["card `*WOBBLE` (line 12), which is not known"]);
+    let deck = "BEGIN BULK\nGRID,1,,0.,0.,0.\nGRID,2,,1.,0.,0.\nGRID,3,,0.,1.,0.\nCTRIA3,1,1,1,2,3\nPSHELL,1,1,.1\n\
+        MAT1,1,2.+5\nCTRIAX6,2,1,1,2,3\nCTRIAX6,3,1,1,2,3\nWOBBLE,1\nSPC1,1,123,1\nENDDATA\n";
+    let (_, counts) = read(Format::Bdf, deck.as_bytes(), &Watch::silent()).unwrap();
+    assert_eq!(counts.left_out(), ["2 elements `CTRIAX6`", "1 cards `WOBBLE`, which are not known"]);
+    for card in ["=,*(1),=,=,*(1.)", "CGEN,TRIA3,1", "SEBULK,1,MIRROR"] {
+        let error = points(Format::Bdf, &deck.replace("WOBBLE,1", card)).unwrap_err();
+        assert!(error.contains("which makes or moves parts of the mesh"), "{card}: {error}");
+    }
+}

@@ -8,5 +8,6 @@ mod formats {
     mod gmsh;
     mod parts;
     mod round_trip;
+    mod spellings;
     mod tables;
 }

@@ -262,6 +262,9 @@ pub(super) fn tell(report: &Report, json: bool, quiet: bool) -> Result<(), Fault
     Ok(())
 }
 
+/// A sweep over thousands of parts says no more than this of what was left out of them.
+const MOST_LINES: usize = 100;
+
 /// What readers left out of the files that they read, each once, however many cases read them.
 pub(super) fn left_out(report: &Report) -> Vec<String> {
     let steps = report.cases.iter().flat_map(|case| &case.steps);
@@ -271,7 +274,12 @@ pub(super) fn left_out(report: &Report) -> Vec<String> {
             all.iter().filter_map(move |what| Some(format!("{name}: left out on reading: {}", what.as_str()?)))
         })
         .collect();
-    lines.into_iter().collect()
+    let rest = lines.len().saturating_sub(MOST_LINES);
+    let mut lines: Vec<String> = lines.into_iter().take(MOST_LINES).collect();
+    if rest > 0 {
+        lines.push(format!("and {rest} more lines about what was left out on reading"));
+    }
+    lines
 }
 
 /// Which checks did not hold.

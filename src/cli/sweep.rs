@@ -7,7 +7,7 @@ use super::Global;
 use super::context::{Planned, RecipeArguments, list_files, open_store, pair, plan_cases, protected};
 use super::exit::{Exit, Fault, data, document_text, say};
 use super::picture::{self, Pictures};
-use super::run::{folder, jobs_of, traced, write_record};
+use super::run::{folder, jobs_of, left_out, traced, write_record};
 use super::signals::Interrupt;
 use super::unchanged::Unchanged;
 use super::{goal, progress, report};
@@ -110,7 +110,11 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Fault>
     if arguments.report {
         report::write(&report, Some(&table), &store, &[], &options.out.join("report.html"))?;
     }
-    let said = tell(&table, arguments, global.quiet)?;
+    let mut said = tell(&table, arguments, global.quiet)?;
+    for line in left_out(&report) {
+        say(&line);
+        said.err.push(line);
+    }
     // Which files a pattern finds is not known from files.
     let whole = !found.lists_files && outcome.unsaved.is_none() && table.count(RowState::Failed) == 0;
     if let Some(unchanged) = unchanged.filter(|_| whole) {

@@ -1,6 +1,6 @@
 //! What a reader did besides reading, and what it left out.
 
-use std::fmt::Write;
+use crate::terminal::printable;
 
 /// Notes by name; the rest is counted, since a deck may have as many as it has lines.
 const MOST_NOTES: usize = 40;
@@ -31,16 +31,16 @@ impl ReadCounts {
             self.more_notes += 1;
             return;
         }
-        let mut note = String::with_capacity(what.len());
-        for letter in what.chars() {
-            // Writing to a string cannot fail.
-            let _ = if letter.is_control() {
-                write!(note, "{}", letter.escape_default())
-            } else {
-                write!(note, "{letter}")
-            };
+        self.notes.push(printable(what).into_owned());
+    }
+
+    /// Notes what costs something to say, which is said only where there is room.
+    pub(super) fn note_with(&mut self, what: impl FnOnce() -> String) {
+        if self.notes.len() == MOST_NOTES {
+            self.more_notes += 1;
+        } else {
+            self.note(&what());
         }
-        self.notes.push(note);
     }
 
     /// All that the file has and the mesh has not, in words: first by name, at most 40, then by number.

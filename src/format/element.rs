@@ -1,8 +1,8 @@
 //! Finite elements as the solver formats name them: what a reader keeps of each, and mid-side nodes for writers.
 //!
 //! Reading: [`Elements`] takes the elements of a file one by one. Triangles and quads become faces, of a second-order
-//! element only the corners are used, lines and points become group members, volumes are left out; the counts of what
-//! was left out are kept. Nodes that only mid-side positions or volumes used are dropped at the end.
+//! element only the corners are used, lines and points become group members, volumes are left out, except where there is nothing
+//! else: then their skin is the mesh; the counts of what was left out are kept. Nodes that only mid-side positions or volumes used are dropped at the end.
 //!
 //! Writing: [`elevate`] adds a node in the middle of each edge, once an edge, so that neighbours share it. Where the
 //! caller gives a projector, the node is moved onto that surface. An element stays valid when the Jacobian determinant
@@ -23,6 +23,7 @@ use rustc_hash::FxHashMap;
 
 use super::error::{FormatError, Place, Reason};
 use super::polygon::triangulate;
+use super::skin::{Volumes, volume_corners};
 use super::{Element, ReadCounts, WriteOptions};
 use crate::mesh::{EdgeKey, Facet, Soup, Support, VertexId, edge_key};
 
@@ -65,6 +66,8 @@ pub(super) enum Placed {
     Edge(EdgeKey),
     /// It is a vertex.
     Vertex(VertexId),
+    /// It is this volume, counted in the order of the file; its skin may be asked for.
+    Volume(u32),
     /// It was left out.
     Nothing,
 }
@@ -78,13 +81,15 @@ pub(super) struct Elements {
     /// Faces in file order.
     pub(super) faces: Vec<Facet>,
     roles: Vec<u8>,
-    counts: ReadCounts,
+    /// What was done besides reading.
+    pub(super) counts: ReadCounts,
+    volumes: Volumes,
 }
 
 impl Elements {
     /// For a file of `nodes` nodes.
     pub(super) fn new(nodes: usize) -> Self {
-        Self { faces: Vec::new(), roles: vec![0; nodes], counts: ReadCounts::default() }
+        Self { roles: vec![0; nodes], ..Self::default() }
     }
 
     /// Makes room for more nodes of the file, `nodes` in all.
@@ -95,9 +100,11 @@ impl Elements {
     /// Adds one element; `nodes` are positions that the caller has checked, at least as many as the shape has corners.
     pub(super) fn add(&mut self, shape: Shape, nodes: &[u32], points: &[DVec3]) -> Placed {
         let corners = &nodes[..shape.corners(nodes.len())];
-        let corner_role = if shape == Shape::Volume { DROPPABLE } else { CORNER };
+        if shape == Shape::Volume {
+            return self.volume(nodes, volume_corners(nodes.len()));
+        }
         for &n in corners {
-            self.roles[n as usize] |= corner_role;
+            self.roles[n as usize] |= CORNER;
         }
         for &n in &nodes[corners.len()..] {
             self.roles[n as usize] |= DROPPABLE;
@@ -109,7 +116,49 @@ impl Elements {
             Shape::Triangle => self.face(Facet::Tri([id(0), id(1), id(2)])),
             Shape::Quad => self.face(quad([id(0), id(1), id(2), id(3)])),
             Shape::Polygon => self.polygon(corners, points),
-            Shape::Volume => self.leave_out(),
+            Shape::Volume => Placed::Nothing,
+        }
+    }
+
+    /// Adds a volume whose first `corners` nodes are its corners; 0 where that is not known.
+    pub(super) fn volume(&mut self, nodes: &[u32], corners: usize) -> Placed {
+        for &n in nodes {
+            self.roles[n as usize] |= DROPPABLE;
+        }
+        self.counts.elements_dropped += 1;
+        Placed::Volume(self.volumes.push(&nodes[..corners.min(nodes.len())]))
+    }
+
+    /// Where the file has volumes and no faces, their skin becomes the faces. The faces of each volume, by its number;
+    /// `None` where there is no skin.
+    pub(super) fn skin(&mut self, points: &[DVec3]) -> Option<Vec<std::ops::Range<usize>>> {
+        if !self.faces.is_empty() {
+            return None;
+        }
+        let (faces, ranges) = self.volumes.skin(points)?;
+        for corner in faces.iter().flat_map(Facet::corners) {
+            self.roles[corner.index()] |= CORNER;
+        }
+        self.faces = faces;
+        let inside = std::mem::take(&mut self.counts.elements_dropped);
+        self.counts.note(&format!("the inside of {inside} volume elements, of which the mesh is the skin"));
+        Some(ranges)
+    }
+
+    /// As [`Self::skin`]; elements that are volumes become their faces of it.
+    pub(super) fn skin_of(&mut self, points: &[DVec3], placed: &mut [Placed]) {
+        let Some(ranges) = self.skin(points) else { return };
+        for element in placed {
+            if let Placed::Volume(volume) = element {
+                *element = ranges.get(*volume as usize).map_or(Placed::Nothing, |range| Placed::Faces(range.clone()));
+            }
+        }
+    }
+
+    /// Takes these nodes for such that may be dropped where nothing uses them.
+    pub(super) fn drop_nodes(&mut self, nodes: std::ops::Range<usize>) {
+        for role in &mut self.roles[nodes] {
+            *role |= DROPPABLE;
         }
     }
 
@@ -151,7 +200,7 @@ impl Elements {
             return Err(match self.counts.elements_dropped {
                 0 => FormatError::new(Place::File, Reason::Nothing("triangles or quads")),
                 _ => FormatError::new(Place::File, Reason::Nothing("surface elements, only volume elements"))
-                    .with_remedy("export the skin of the volume mesh as triangles or quads"),
+                    .with_remedy("their skin is not known: export it as triangles or quads"),
             });
         }
         soup.faces = self.faces.into();
@@ -165,7 +214,7 @@ impl Elements {
 }
 
 /// A quad, or the triangle that is left when two neighbouring corners are one node.
-fn quad(c: [VertexId; 4]) -> Facet {
+pub(super) fn quad(c: [VertexId; 4]) -> Facet {
     for i in 0..4 {
         if c[i] == c[(i + 1) % 4] {
             let rest = [c[(i + 1) % 4], c[(i + 2) % 4], c[(i + 3) % 4]];

@@ -98,6 +98,14 @@ pub enum Reason {
     /// Neither the name nor the content tells the format.
     #[error("neither the file's ending nor its content tells the format")]
     Unknown,
+    /// A file that the deck includes cannot be read.
+    #[error("`{name}` is not included: {why}")]
+    Include {
+        /// The file as the deck names it.
+        name: String,
+        /// Why.
+        why: String,
+    },
     /// The run was interrupted.
     #[error("cancelled")]
     Cancelled,
@@ -108,6 +116,8 @@ pub enum Reason {
 pub struct FormatError {
     /// The format, where it is known.
     pub format: Option<Format>,
+    /// The included file that the place lies in; none for the file itself.
+    pub included: Option<String>,
     /// Where.
     pub place: Place,
     /// What and why.
@@ -119,7 +129,7 @@ pub struct FormatError {
 impl FormatError {
     /// A fault at a place.
     pub fn new(place: Place, reason: Reason) -> Self {
-        Self { format: None, place, reason, remedy: None }
+        Self { format: None, included: None, place, reason, remedy: None }
     }
 
     /// Something else was expected at `place`.
@@ -157,6 +167,9 @@ impl fmt::Display for FormatError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if let Some(format) = self.format {
             write!(f, "{}, ", format.title())?;
+        }
+        if let Some(included) = &self.included {
+            write!(f, "{}, ", included.escape_debug())?;
         }
         match self.place {
             Place::Line(line) => write!(f, "line {line}: ")?,

@@ -12,6 +12,7 @@ mod csv;
 mod element;
 mod error;
 mod group_text;
+pub mod include;
 mod inp;
 mod kept;
 mod mixed;
@@ -21,6 +22,7 @@ mod off;
 mod ply;
 mod polygon;
 mod sets;
+mod skin;
 mod stl;
 mod text;
 mod vtk;
@@ -221,8 +223,17 @@ impl Format {
 /// # Errors
 /// Where the file is damaged, with the line or byte; when `watch` is cancelled.
 pub fn read(format: Format, bytes: &[u8], watch: &Watch) -> ReadResult {
+    if text::is_utf16(bytes) && !(format == Format::Stl && stl::binary_size_fits(bytes)) {
+        return Err(FormatError::new(Place::File, Reason::Unsupported("UTF-16".to_owned()))
+            .in_format(format)
+            .with_remedy("the file is UTF-16: save it as UTF-8"));
+    }
     (format.def().read)(bytes, watch).map_err(|error| {
-        let error = error.in_format(format);
+        let mut error = error.in_format(format);
+        if let (true, Place::Line(line)) = (format.has_includes(), error.place) {
+            let (included, line) = include::locate(bytes, line);
+            (error.included, error.place) = (included, Place::Line(line));
+        }
         match Format::from_content(bytes) {
             Some(other) if other != format && error.reason != Reason::Cancelled => {
                 let (title, name) = (other.title(), other.name());

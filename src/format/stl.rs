@@ -2,7 +2,8 @@
 //!
 //! Layout after 3D Systems, "Stereolithography Interface Specification", 1988. A file is binary when its size is
 //! exactly what the facet count says, whatever its header begins with; else text when it begins with `solid` and the
-//! start has no byte that text cannot have. Each named solid becomes a face group; with several solids, a repeated or
+//! start has no byte that text cannot have. Keywords may be written in two words and in any case (`end loop`), numbers
+//! with decimal commas, and the last `endsolid` may be missing, which is told. Each named solid becomes a face group; with several solids, a repeated or
 //! missing name becomes `NAME_2` or `solid_2` (the number of the solid). Normals and attribute bytes are ignored:
 //! corners tell the orientation.
 //!
@@ -18,7 +19,7 @@ use glam::DVec3;
 use super::binary::{ByteOrder, ByteReader, check_single, finite};
 use super::error::{FormatError, Place, Reason};
 use super::sets::partition;
-use super::text::{Scanner, push_number};
+use super::text::{Scanner, parse_number, push_number};
 use super::weld::Welder;
 use super::{FormatDef, ReadCounts, ReadResult, WriteOptions};
 use crate::mesh::{FaceId, Facet, Soup, VertexId};
@@ -45,13 +46,17 @@ fn announced_facets(bytes: &[u8]) -> Option<u32> {
     Some(u32::from_le_bytes([raw[0], raw[1], raw[2], raw[3]]))
 }
 
-fn binary_size_fits(bytes: &[u8]) -> bool {
+/// Whether the size is that of a binary file.
+pub(super) fn binary_size_fits(bytes: &[u8]) -> bool {
     announced_facets(bytes).is_some_and(|n| n > 0 && bytes.len() as u64 == 84 + FACET as u64 * u64::from(n))
 }
 
 fn looks_like_text(bytes: &[u8]) -> bool {
     let start = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes).trim_ascii_start();
-    let solid = start.get(..5).is_some_and(|w| w.eq_ignore_ascii_case(b"solid"));
+    let word = |word: &[u8]| start.get(..word.len()).is_some_and(|w| w.eq_ignore_ascii_case(word));
+    // A comment may stand before it, in a line of its own; then the error tells of that.
+    let later = |line: &[u8]| line.get(..5).is_some_and(|w| w.eq_ignore_ascii_case(b"solid"));
+    let solid = word(b"solid") || start[..start.len().min(4096)].split(|&b| b == b'\n').any(later);
     // The name may be in any encoding, but no text has control bytes.
     solid && start.iter().take(512).all(|&b| b >= b' ' || b.is_ascii_whitespace() || b == 0x0b)
 }
@@ -142,10 +147,11 @@ fn read_text(bytes: &[u8], watch: &Watch) -> ReadResult {
     let mut faces = Vec::new();
     let mut solids = Solids::new();
     let mut open = false;
+    let mut commas = 0;
     watch.phase("reading facets", Some(bytes.len() as u64));
     while let Some(word) = scanner.word() {
         if word.eq_ignore_ascii_case(b"facet") && open {
-            faces.push(Facet::Tri(text_facet(&mut scanner, &mut welder)?));
+            faces.push(Facet::Tri(text_facet(&mut scanner, &mut welder, &mut commas)?));
             if usize::is_multiple_of(faces.len(), STRIDE) {
                 watch.check()?;
                 watch.advance(scanner.offset() as u64, || format!("{} facets", faces.len()));
@@ -153,28 +159,35 @@ fn read_text(bytes: &[u8], watch: &Watch) -> ReadResult {
         } else if word.eq_ignore_ascii_case(b"solid") && !open {
             solids.push((String::from_utf8_lossy(scanner.rest_of_line()).into_owned(), faces.len()));
             open = true;
-        } else if (word.eq_ignore_ascii_case(b"endsolid") || word.eq_ignore_ascii_case(b"end")) && open {
+        } else if open && is_end(&mut scanner, word, b"solid", true) {
             scanner.rest_of_line();
             open = false;
         } else {
             let expected = if open { "`facet` or `endsolid`" } else { "`solid`" };
-            return Err(FormatError::unexpected(scanner.place(), expected, word));
+            let error = FormatError::unexpected(scanner.place(), expected, word);
+            return Err(if open { error } else { error.with_remedy("there is text before `solid`: remove it") });
         }
-    }
-    if open {
-        return Err(FormatError::new(scanner.place(), Reason::Truncated { within: "a solid" })
-            .with_remedy("the file is cut off before `endsolid`: export it again"));
     }
     if faces.is_empty() {
         return Err(FormatError::new(Place::File, Reason::Nothing("facets")));
     }
-    let (mut soup, counts) = finish(welder, faces);
+    let (mut soup, mut counts) = finish(welder, faces);
+    if open {
+        counts.note("nothing, but the file ends before `endsolid`: it may be cut off");
+    }
+    if commas > 0 {
+        counts.note("nothing, but decimal commas were taken for points");
+    }
     soup.carried.groups.faces = solid_groups(&solids, soup.faces.len());
     Ok((soup, counts))
 }
 
 /// Reads a facet after its first word.
-fn text_facet(scanner: &mut Scanner<'_>, welder: &mut Welder) -> Result<[VertexId; 3], FormatError> {
+fn text_facet(
+    scanner: &mut Scanner<'_>,
+    welder: &mut Welder,
+    commas: &mut usize,
+) -> Result<[VertexId; 3], FormatError> {
     expect(scanner, b"normal", "`normal`")?;
     for _ in 0..3 {
         // A normal is never used, and degenerate facets often have one that is no number.
@@ -185,14 +198,53 @@ fn text_facet(scanner: &mut Scanner<'_>, welder: &mut Welder) -> Result<[VertexI
     let mut corners = [VertexId::from_raw(0); 3];
     for corner in &mut corners {
         expect(scanner, b"vertex", "`vertex`")?;
-        let x = scanner.number("a coordinate")?;
-        let y = scanner.number("a coordinate")?;
-        let z = scanner.number("a coordinate")?;
-        *corner = weld(welder, DVec3::new(x, y, z), scanner.place())?;
+        let mut position = [0.0; 3];
+        for number in &mut position {
+            *number = coordinate(scanner, commas)?;
+        }
+        *corner = weld(welder, DVec3::from_array(position), scanner.place())?;
     }
-    expect(scanner, b"endloop", "`endloop`")?;
-    expect(scanner, b"endfacet", "`endfacet`")?;
+    expect_end(scanner, b"loop", "`endloop`")?;
+    expect_end(scanner, b"facet", "`endfacet`")?;
     Ok(corners)
+}
+
+/// A coordinate, with a decimal point or, from programs that follow the habits of a country, a decimal comma.
+fn coordinate(scanner: &mut Scanner<'_>, commas: &mut usize) -> Result<f64, FormatError> {
+    let word = skip_word(scanner)?;
+    let mut parts = word.split(|&b| b == b',');
+    let (Some(whole), Some(fraction), None) = (parts.next(), parts.next(), parts.next()) else {
+        return parse_number(word, "a coordinate", scanner.place());
+    };
+    let is_one = whole.last().is_some_and(u8::is_ascii_digit)
+        && fraction.first().is_some_and(u8::is_ascii_digit)
+        && !word.contains(&b'.');
+    if !is_one {
+        return parse_number(word, "a coordinate", scanner.place());
+    }
+    *commas += 1;
+    parse_number(&[whole, b".", fraction].concat(), "a coordinate", scanner.place())
+}
+
+/// Whether `word` ends a `what`: `endloop`, `end loop`, `end_loop`. Where `alone`, `end` does too, with all that follows.
+fn is_end(scanner: &mut Scanner<'_>, word: &[u8], what: &[u8], alone: bool) -> bool {
+    let is = |word: &[u8], end: &[u8]| word.eq_ignore_ascii_case(end);
+    let whole = word.get(..3).filter(|end| is(end, b"end")).map(|_| &word[3..]);
+    match whole {
+        Some(b"") if alone => true,
+        Some(b"") => scanner.word().is_some_and(|next| is(next, what)),
+        Some(rest) => is(rest.strip_prefix(b"_").unwrap_or(rest), what),
+        None => false,
+    }
+}
+
+fn expect_end(scanner: &mut Scanner<'_>, what: &[u8], expected: &'static str) -> Result<(), FormatError> {
+    let word = skip_word(scanner)?;
+    if is_end(scanner, word, what, false) {
+        Ok(())
+    } else {
+        Err(FormatError::unexpected(scanner.place(), expected, word))
+    }
 }
 
 fn skip_word<'a>(scanner: &mut Scanner<'a>) -> Result<&'a [u8], FormatError> {

@@ -130,15 +130,6 @@ impl<'a> Scanner<'a> {
         false
     }
 
-    /// A finite number on this line or a later one.
-    #[inline]
-    pub(super) fn number(&mut self, what: &'static str) -> Result<f64, FormatError> {
-        match self.word() {
-            Some(word) => parse_number(word, what, self.place()),
-            None => Err(FormatError::new(self.place(), Reason::Truncated { within: what })),
-        }
-    }
-
     /// An integer on this line or a later one.
     #[inline]
     pub(super) fn integer(&mut self, what: &'static str) -> Result<i64, FormatError> {
@@ -190,6 +181,17 @@ impl<'a> Scanner<'a> {
     }
 }
 
+/// Whether a file is text of 16 bits a letter: by its mark, or since every second byte of its beginning is zero.
+pub(super) fn is_utf16(bytes: &[u8]) -> bool {
+    let start = &bytes[..bytes.len().min(64)];
+    let zero_at = |odd: usize| {
+        start.len() > 8
+            && start.iter().enumerate().all(|(i, &b)| (b == 0) == (i % 2 == odd))
+            && start.len().is_multiple_of(2)
+    };
+    bytes.starts_with(b"\xff\xfe") || bytes.starts_with(b"\xfe\xff") || zero_at(0) || zero_at(1)
+}
+
 /// `count` as a size, when it is not negative and at most `room`.
 pub(super) fn claim(count: i64, room: usize, what: &'static str, place: Place) -> Result<usize, FormatError> {
     match usize::try_from(count) {
@@ -219,6 +221,8 @@ pub(super) fn parse_number(word: &[u8], what: &'static str, place: Place) -> Res
         Some(value) if value.is_finite() => Ok(value),
         Some(_) => Err(not_finite(what, word, place)),
         None if looks_not_finite(word) => Err(not_finite(what, word, place)),
+        None if has_comma(word) => Err(FormatError::unexpected(place, what, word)
+            .with_remedy("this is a decimal comma: export the file with decimal points")),
         None => Err(FormatError::unexpected(place, what, word)),
     }
 }
@@ -234,6 +238,12 @@ pub(super) fn parse_integer(word: &[u8], what: &'static str, place: Place) -> Re
         Some(value) if value.fract() == 0.0 && value.abs() < 9e15 => Ok(value as i64),
         _ => Err(FormatError::unexpected(place, what, word)),
     }
+}
+
+/// Whether it is a number but for a decimal comma.
+fn has_comma(word: &[u8]) -> bool {
+    let text = std::str::from_utf8(word).unwrap_or_default();
+    text.matches(',').count() == 1 && text.replace(',', ".").parse::<f64>().is_ok()
 }
 
 /// Microsoft's runtime writes `-1.#IND` and the like.

@@ -91,7 +91,7 @@ pub enum ReadError {
         /// The file's name.
         name: String,
         /// What and where.
-        error: FormatError,
+        error: Box<FormatError>,
     },
     /// The scale is zero, negative or not finite.
     #[error("scale must be positive and finite, got {0}")]
@@ -114,8 +114,8 @@ pub fn read(file: &FileBytes, params: &ReadParams, watch: &Watch) -> Result<(Sou
     if !(params.scale > 0.0 && params.scale.is_finite()) {
         return Err(ReadError::BadScale(params.scale));
     }
-    let (format, mut soup, counts) =
-        read_format(file, params, watch).map_err(|error| ReadError::Format { name: file.name.clone(), error })?;
+    let (format, mut soup, counts) = read_format(file, params, watch)
+        .map_err(|error| ReadError::Format { name: file.name.clone(), error: Box::new(error) })?;
     scale_points(&mut soup, params.scale)?;
     let stats = stats(format, &soup, &counts);
     Ok((soup, stats))
@@ -170,9 +170,7 @@ impl From<ReadError> for StepFailure {
     fn from(error: ReadError) -> Self {
         let message = error.to_string();
         match error {
-            ReadError::Format { error: FormatError { reason: Reason::Cancelled, .. }, .. } => {
-                crate::watch::Cancelled.into()
-            }
+            ReadError::Format { error, .. } if error.reason == Reason::Cancelled => crate::watch::Cancelled.into(),
             ReadError::Format { error, .. } => {
                 let failure = Self::bad_input(message).with_elements(place_element(error.place));
                 match error.remedy {
@@ -201,7 +199,7 @@ pub struct Step;
 
 impl StepContract for Step {
     const NAME: &'static str = "read";
-    const REVISION: u32 = 2;
+    const REVISION: u32 = 3;
     const INPUTS: &'static [InputDef] =
         &[InputDef { name: "file", accepts: &[Port::File], required: true, doc: "the mesh file" }];
     const OUTPUTS: &'static [OutputDef] = &[OutputDef { name: "main", port: OutPort::Is(Port::Soup), derive: None }];

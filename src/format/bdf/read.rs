@@ -9,12 +9,16 @@ use super::super::ReadResult;
 use super::super::element::{Elements, Placed, Shape};
 use super::super::error::{FormatError, Place, Reason};
 use super::cards::{Card, Cards, Item};
+use super::harmless::{Unread, judge};
 use super::systems::{Grid, Systems};
 use crate::mesh::{EdgeKey, FaceId, Soup};
 use crate::watch::Watch;
 
 /// Cards between two looks at the watch.
 const STRIDE: u64 = 1 << 16;
+
+/// Names of cards that are neither read nor harmless which are kept.
+const MOST_UNREAD: usize = 1000;
 
 pub(super) fn read(bytes: &[u8], watch: &Watch) -> ReadResult {
     let mut deck = Deck::default();
@@ -53,16 +57,21 @@ struct Deck {
     /// The grid numbers of all elements, one after another.
     nodes: Vec<i64>,
     names: BTreeMap<i64, String>,
+    /// Cards that are neither read nor harmless, and how many of each.
+    unread: BTreeMap<String, (Unread, usize)>,
 }
 
 impl Deck {
     fn card(&mut self, card: &Card) -> Result<(), FormatError> {
         match card.name.as_str() {
             "GRID" => self.grid(card),
-            "CTRIA3" | "CTRIAR" => self.element(card, Shape::Triangle, 2, 3..=3),
-            "CTRIA6" => self.element(card, Shape::Triangle, 2, 3..=6),
-            "CQUAD4" | "CQUADR" => self.element(card, Shape::Quad, 2, 4..=4),
-            "CQUAD8" => self.element(card, Shape::Quad, 2, 4..=8),
+            "CTRIA3" | "CTRIAR" | "CPLSTN3" | "CPLSTS3" | "CTRAX3" => self.element(card, Shape::Triangle, 2, 3..=3),
+            "CTRIA6" | "CTRIAX" | "CPLSTN6" | "CPLSTS6" => self.element(card, Shape::Triangle, 2, 3..=6),
+            "CQUAD4" | "CQUADR" | "CSHEAR" | "CPLSTN4" | "CPLSTS4" | "CQUADX4" => {
+                self.element(card, Shape::Quad, 2, 4..=4)
+            }
+            "CQUAD8" | "CPLSTN8" | "CPLSTS8" | "CQUADX8" => self.element(card, Shape::Quad, 2, 4..=8),
+            "CQUAD" | "CQUADX" => self.element(card, Shape::Quad, 2, 4..=9),
             "CBAR" | "CBEAM" | "CROD" | "CTUBE" => self.element(card, Shape::Line, 2, 2..=2),
             "CONROD" | "PLOTEL" => self.element(card, Shape::Line, 1, 2..=2),
             "CTETRA" => self.element(card, Shape::Volume, 2, 4..=10),
@@ -71,10 +80,25 @@ impl Deck {
             "CHEXA" => self.element(card, Shape::Volume, 2, 8..=20),
             name if name.starts_with("INCLUDE") => {
                 Err(FormatError::new(card.place(), Reason::Unsupported("`INCLUDE`".into()))
-                    .with_remedy("put the included cards into this file"))
+                    .with_remedy("give the deck the ending .bdf, so that what it includes is looked for"))
             }
-            _ => self.systems.card(card).map(|_| ()),
+            _ if self.systems.card(card)? => Ok(()),
+            name => self.unread(name, card),
         }
+    }
+
+    /// A card that is not read: refused where it makes geometry, else noted unless it is harmless.
+    fn unread(&mut self, name: &str, card: &Card) -> Result<(), FormatError> {
+        let unread = judge(name);
+        if unread == Unread::MakesGeometry {
+            let what = format!("`{name}`, which makes or moves parts of the mesh,");
+            return Err(FormatError::new(card.place(), Reason::Unsupported(what))
+                .with_remedy("let the program that wrote the deck write out its grid points and elements"));
+        }
+        if unread != Unread::Harmless && (self.unread.len() < MOST_UNREAD || self.unread.contains_key(name)) {
+            self.unread.entry(name.to_owned()).or_insert((unread, 0)).1 += 1;
+        }
+        Ok(())
     }
 
     fn grid(&mut self, card: &Card) -> Result<(), FormatError> {
@@ -135,6 +159,7 @@ impl Deck {
         let mut gathered = Elements::new(points.len());
         let mut faces: BTreeMap<i64, Vec<FaceId>> = BTreeMap::new();
         let mut edges: BTreeMap<i64, Vec<EdgeKey>> = BTreeMap::new();
+        let mut placed = Vec::with_capacity(self.elements.len());
         let mut positions = Vec::new();
         let mut start = 0;
         for element in &self.elements {
@@ -143,10 +168,14 @@ impl Deck {
                 positions.push(self.position(node, element.line)?);
             }
             start = element.end;
-            match gathered.add(element.shape, &positions, &points) {
+            placed.push(gathered.add(element.shape, &positions, &points));
+        }
+        gathered.skin_of(&points, &mut placed);
+        for (element, placed) in self.elements.iter().zip(placed) {
+            match placed {
                 Placed::Faces(range) => faces.entry(element.property).or_default().extend(range.map(FaceId::new)),
                 Placed::Edge(edge) if edge[0] != edge[1] => edges.entry(element.property).or_default().push(edge),
-                Placed::Edge(_) | Placed::Vertex(_) | Placed::Nothing => {}
+                Placed::Edge(_) | Placed::Vertex(_) | Placed::Volume(_) | Placed::Nothing => {}
             }
         }
         let mut soup = Soup { points: points.into(), ..Soup::default() };
@@ -164,6 +193,12 @@ impl Deck {
         for members in groups.edges.values_mut() {
             members.sort_unstable();
             members.dedup();
+        }
+        for (name, (unread, count)) in &self.unread {
+            gathered.counts.note_with(|| match unread {
+                Unread::Element => format!("{count} elements `{name}`"),
+                _ => format!("{count} cards `{name}`, which are not known"),
+            });
         }
         let counts = gathered.finish(&mut soup)?;
         Ok((soup, counts))

@@ -7,9 +7,11 @@
 //! them; other elements are left out and counted. `*ELSET` becomes a face group (and an edge group where it holds
 //! beams), `*NSET` a vertex group, `*SURFACE` a face group, of nodes a vertex group, of element sides `E1` to `E4` an
 //! edge group. Sets may list numbers, ranges (`GENERATE`) and other sets. Names are compared without regard to case, and
-//! keep the case of their first use. Parts have numbers of their own; an instance may be moved, but used once only.
-//! A set named `Eall` or `Nall` that holds everything is no group. `*INCLUDE` is refused: formats open no files. So are cards
-//! that make, copy or move nodes or elements, by name: passed over, they would leave another mesh.
+//! keep the case of their first use. Parts have numbers of their own. Each instance of a part is moved, then turned, and has the sets of the part;
+//! where sets of two instances have one name, it follows the name of the instance and a point.
+//! A set named `Eall` or `Nall` that holds everything is no group. `*INCLUDE` is followed where files are opened (see `format::include`), and refused here. So are cards
+//! that make, copy or move nodes or elements, by name: passed over, they would leave another mesh. Cards that are neither
+//! read nor known to be harmless are passed over and named.
 //!
 //! Writing: nodes, elements by type in the set `Eall`, an `*ELSET` and a `*SURFACE` (positive side) for each face group
 //! and region, an `*NSET` for each vertex group and for the nodes of each edge group, since no solver agrees with
@@ -21,6 +23,8 @@
 //! Linear in the size of the file; sets may hold at most 64 times as many members as there are nodes and elements.
 
 mod elements;
+mod harmless;
+mod instance;
 mod read;
 mod sets;
 mod write;

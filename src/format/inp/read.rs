@@ -1,46 +1,54 @@
 //! Reads input files: first the cards with their numbers, then what the numbers mean.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
+use std::sync::Arc;
 
 use glam::DVec3;
 use rustc_hash::FxHashMap;
 
 use super::super::ReadCounts;
-use super::super::element::{Elements, Shape};
+use super::super::element::Shape;
 use super::super::error::{FormatError, Place, Reason};
 use super::super::text::{parse_integer, parse_number};
 use super::elements::element_type;
-use super::sets::{Card, Kind, Sets};
+use super::harmless::{MAKES_GEOMETRY, is_harmless};
+use super::instance::{Instance, Placement};
+use super::sets::{Card, Kind};
 use crate::mesh::Soup;
 use crate::watch::Watch;
 
 /// Lines between two looks at the watch.
 const STRIDE: u64 = 1 << 16;
 
-/// Numbers of one part.
+/// Names of unknown cards that are kept.
+const MOST_UNKNOWN: usize = 1000;
+
+/// Numbers of one part, or of the assembly, which is the first scope; or an instance of a part, with the part's numbers.
 #[derive(Debug, Default)]
 pub(super) struct Scope {
-    /// The part's name, empty outside parts.
+    /// The name of the part or instance, empty outside both.
     pub(super) name: String,
     /// Positions of nodes by number.
     pub(super) nodes: FxHashMap<i64, u32>,
     /// Positions of elements by number.
     pub(super) elements: FxHashMap<i64, u32>,
-    /// Where its nodes begin and end.
-    first: usize,
-    end: usize,
-    /// Whether an instance was made of it.
-    placed: bool,
+    /// Where its nodes lie among all.
+    pub(super) node_range: Range<usize>,
+    /// Where its elements lie among all.
+    pub(super) element_range: Range<usize>,
+    /// The part that this is an instance of, and where it stands.
+    pub(super) instance: Option<Instance>,
 }
 
 /// An element as its card gives it.
 #[derive(Debug)]
-struct RawElement {
-    scope: u32,
-    shape: Option<Shape>,
+pub(super) struct RawElement {
+    pub(super) scope: u32,
+    pub(super) shape: Option<Shape>,
     /// Where its nodes end in the list of all elements' nodes.
-    end: usize,
-    line: u64,
+    pub(super) end: usize,
+    pub(super) line: u64,
 }
 
 /// What data lines belong to.
@@ -50,26 +58,28 @@ enum Block {
     Nodes { set: Option<usize> },
     Elements { shape: Option<Shape>, nodes: usize, set: Option<usize> },
     Set { card: usize },
-    Instance { scope: usize, lines: usize },
+    Instance { lines: usize },
 }
 
 #[derive(Debug)]
-struct Reader {
-    points: Vec<DVec3>,
-    scopes: Vec<Scope>,
+pub(super) struct Reader<'a> {
+    /// The whole file.
+    pub(super) bytes: &'a [u8],
+    pub(super) points: Vec<DVec3>,
+    pub(super) scopes: Vec<Scope>,
     scope: usize,
-    instances: BTreeMap<String, usize>,
-    elements: Vec<RawElement>,
-    element_nodes: Vec<i64>,
-    cards: Vec<Card>,
+    /// Scopes of instances by name in upper case.
+    pub(super) instances: BTreeMap<String, usize>,
+    pub(super) elements: Vec<RawElement>,
+    pub(super) element_nodes: Vec<i64>,
+    pub(super) cards: Vec<Card>,
     block: Block,
     /// Nodes that the last element still wants.
     missing: usize,
+    /// Cards that are not known, each with its first line.
+    pub(super) unknown: BTreeMap<String, u64>,
+    in_step: bool,
 }
-
-/// Cards that create, copy, move or join nodes, elements or sets: passing over them would give another mesh.
-const MAKES_GEOMETRY: [&str; 9] =
-    ["NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY", "IMPORT", "IMPERFECTION", "SYMMETRIC MODEL GENERATION"];
 
 /// Cards whose data may stand in another file.
 const TAKES_A_FILE: [&str; 5] = ["NODE", "ELEMENT", "NSET", "ELSET", "SURFACE"];
@@ -77,6 +87,7 @@ const TAKES_A_FILE: [&str; 5] = ["NODE", "ELEMENT", "NSET", "ELSET", "SURFACE"];
 /// Reads an input file.
 pub(super) fn read(bytes: &[u8], watch: &Watch) -> Result<(Soup, ReadCounts), FormatError> {
     let mut reader = Reader {
+        bytes,
         points: Vec::new(),
         scopes: vec![Scope::default()],
         scope: 0,
@@ -86,6 +97,8 @@ pub(super) fn read(bytes: &[u8], watch: &Watch) -> Result<(Soup, ReadCounts), Fo
         cards: Vec::new(),
         block: Block::Skip,
         missing: 0,
+        unknown: BTreeMap::new(),
+        in_step: false,
     };
     let mut keyword: Option<(String, u64)> = None;
     let lines = bytes.split(|&b| b == b'\n').map(<[u8]>::trim_ascii);
@@ -114,11 +127,11 @@ pub(super) fn read(bytes: &[u8], watch: &Watch) -> Result<(Soup, ReadCounts), Fo
 }
 
 /// The comma-separated items of a data line; a comma at the end is no item.
-fn items(line: &[u8]) -> impl Iterator<Item = &[u8]> {
+pub(super) fn items(line: &[u8]) -> impl Iterator<Item = &[u8]> {
     line.strip_suffix(b",").unwrap_or(line).split(|&b| b == b',').map(<[u8]>::trim_ascii)
 }
 
-impl Reader {
+impl Reader<'_> {
     /// Takes a keyword line; gives it back when it goes on in the next line.
     fn keyword(&mut self, text: String, line: u64) -> Result<Option<(String, u64)>, FormatError> {
         if text.ends_with(',') {
@@ -145,13 +158,14 @@ impl Reader {
                     let what = "a cylindrical or spherical system of nodes".to_owned();
                     return Err(FormatError::new(place, Reason::Unsupported(what)));
                 }
+                self.not_in_instance("NODE", place)?;
                 Block::Nodes { set: value("NSET").map(|n| self.card(Kind::Nodes, n, line, self.scope)) }
             }
             "ELEMENT" => self.element_block(value("TYPE"), value("ELSET"), line)?,
             "NSET" | "ELSET" | "SURFACE" => self.set_block(&name, &value, line),
             "INCLUDE" => {
                 return Err(FormatError::new(place, Reason::Unsupported("*INCLUDE".into()))
-                    .with_remedy("put the included file's lines in its place"));
+                    .with_remedy("give the deck the ending .inp, so that what it includes is looked for"));
             }
             "SYSTEM" => {
                 return Err(FormatError::new(place, Reason::Unsupported("*SYSTEM".into()))
@@ -166,17 +180,28 @@ impl Reader {
             }
             "PART" => {
                 let name = value("NAME").unwrap_or("").to_owned();
-                let first = self.points.len();
-                self.scopes.push(Scope { name, first, end: first, ..Scope::default() });
+                let (nodes, elements) = (self.points.len(), self.elements.len());
+                let (node_range, element_range) = (nodes..nodes, elements..elements);
+                self.scopes.push(Scope { name, node_range, element_range, ..Scope::default() });
                 self.scope = self.scopes.len() - 1;
                 Block::Skip
             }
-            "END PART" | "ENDPART" => {
+            "STEP" | "END STEP" => {
+                self.in_step = name == "STEP";
+                Block::Skip
+            }
+            "END PART" | "ENDPART" | "END INSTANCE" | "ENDINSTANCE" => {
                 self.scope = 0;
                 Block::Skip
             }
             "INSTANCE" => self.instance(value("NAME").unwrap_or(""), value("PART").unwrap_or(""), place)?,
-            _ => Block::Skip,
+            name => {
+                // In a step of the analysis all is about the analysis.
+                if !self.in_step && !is_harmless(name) && self.unknown.len() < MOST_UNKNOWN {
+                    self.unknown.entry(name.to_owned()).or_insert(line);
+                }
+                Block::Skip
+            }
         };
         Ok(None)
     }
@@ -213,24 +238,35 @@ impl Reader {
         let Some(kind) = kind else {
             return Err(FormatError::new(Place::Line(line), Reason::Nothing("element type (TYPE=)")));
         };
+        self.not_in_instance("ELEMENT", Place::Line(line))?;
         let known = element_type(&kind.to_ascii_uppercase());
         let set = set.map(|n| self.card(Kind::Elements, n, line, self.scope));
         Ok(Block::Elements { shape: known.map(|(s, _)| s), nodes: known.map_or(0, |(_, n)| n), set })
     }
 
+    /// An instance of a part: it has the numbers of the part, and sets of its own until it ends.
     fn instance(&mut self, name: &str, part: &str, place: Place) -> Result<Block, FormatError> {
-        let found = self.scopes.iter().position(|s| !s.name.is_empty() && s.name.eq_ignore_ascii_case(part));
-        let Some(scope) = found else {
+        let is_part = |s: &Scope| s.instance.is_none() && !s.name.is_empty() && s.name.eq_ignore_ascii_case(part);
+        let Some(part) = self.scopes.iter().position(is_part) else {
             return Err(FormatError::unexpected(place, "a part defined above", part.as_bytes()));
         };
-        if std::mem::replace(&mut self.scopes[scope].placed, true) {
-            let what = format!("a second instance of part {part}");
-            return Err(
-                FormatError::new(place, Reason::Unsupported(what)).with_remedy("export the assembly as one flat part")
-            );
+        let scope = self.scopes.len();
+        if self.instances.insert(name.to_ascii_uppercase(), scope).is_some() {
+            return Err(FormatError::unexpected(place, "another name than that of an instance above", name.as_bytes()));
         }
-        self.instances.insert(name.to_ascii_uppercase(), scope);
-        Ok(Block::Instance { scope, lines: 0 })
+        let instance = Some(Instance { part, placement: Placement::default() });
+        self.scopes.push(Scope { name: name.to_owned(), instance, ..Scope::default() });
+        self.scope = scope;
+        Ok(Block::Instance { lines: 0 })
+    }
+
+    /// Nodes and elements belong to parts and to the assembly.
+    fn not_in_instance(&self, what: &str, place: Place) -> Result<(), FormatError> {
+        if self.scopes[self.scope].instance.is_none() {
+            return Ok(());
+        }
+        Err(FormatError::new(place, Reason::Unsupported(format!("*{what} within an instance")))
+            .with_remedy("define it in the part"))
     }
 
     fn scope_of(&self, instance: Option<&str>) -> Option<usize> {
@@ -239,17 +275,9 @@ impl Reader {
     }
 
     fn card(&mut self, kind: Kind, name: &str, line: u64, scope: usize) -> usize {
-        let (members, rows) = (Vec::new(), Vec::new());
-        self.cards.push(Card {
-            kind,
-            name: name.to_owned(),
-            generate: false,
-            scope,
-            members,
-            rows,
-            line,
-            unread: None,
-        });
+        let (members, rows) = (Vec::new(), Arc::default());
+        let (name, owner) = (name.to_owned(), self.scope);
+        self.cards.push(Card { kind, name, generate: false, owner, scope, members, rows, line, unread: None });
         self.cards.len() - 1
     }
 
@@ -263,9 +291,12 @@ impl Reader {
                 self.cards[card].row(line, place);
                 Ok(())
             }
-            Block::Instance { scope, lines } => {
-                self.block = Block::Instance { scope, lines: lines + 1 };
-                self.place_instance(scope, lines, line, place)
+            Block::Instance { lines } => {
+                self.block = Block::Instance { lines: lines + 1 };
+                match &mut self.scopes[self.scope].instance {
+                    Some(instance) => instance.placement.line(lines, line, place),
+                    None => Ok(()),
+                }
             }
         }
     }
@@ -289,7 +320,7 @@ impl Reader {
             return Err(FormatError::new(place, Reason::Duplicate { what: "node", id }));
         }
         self.points.push(position);
-        self.scopes[self.scope].end = self.points.len();
+        self.scopes[self.scope].node_range.end = self.points.len();
         if let Some(card) = set {
             self.cards[card].members.push(next);
         }
@@ -312,6 +343,7 @@ impl Reader {
             }
             let (scope, end) = (self.scope as u32, self.element_nodes.len());
             self.elements.push(RawElement { scope, shape, end, line: number });
+            self.scopes[self.scope].element_range.end = self.elements.len();
             self.missing = nodes;
             if let Some(card) = set {
                 self.cards[card].members.push(next);
@@ -322,36 +354,35 @@ impl Reader {
         }
         // Beams may name a node for their orientation, and wedges of 15 nodes may have three more.
         let may_have_more = shape == Some(Shape::Line) || nodes == 15;
+        let mut foreign = false;
         for item in items {
             if self.missing > 0 {
-                self.element_nodes.push(parse_integer(item, "a node number", place)?);
                 self.missing -= 1;
+                if self.is_of_instance(item) {
+                    foreign = true;
+                    continue;
+                }
+                self.element_nodes.push(parse_integer(item, "a node number", place)?);
             } else if !item.is_empty() && !may_have_more {
                 return Err(FormatError::unexpected(place, "the end of the element", item)
                     .with_remedy("this line has too many nodes for the element type, or one before it too few"));
             }
         }
         if let Some(element) = self.elements.last_mut() {
+            // An element between instances, such as a connector: it is no face, and its nodes are theirs.
+            if foreign {
+                element.shape = None;
+            }
             element.end = self.element_nodes.len();
         }
         Ok(())
     }
 
-    /// The first line of an instance moves it, the second turns it.
-    fn place_instance(&mut self, scope: usize, before: usize, line: &[u8], place: Place) -> Result<(), FormatError> {
-        let mut shift = DVec3::ZERO;
-        for (axis, item) in items(line).take(3).enumerate().filter(|(_, i)| !i.is_empty()) {
-            shift[axis] = parse_number(item, "a translation", place)?;
-        }
-        if before > 0 {
-            return Err(FormatError::new(place, Reason::Unsupported("a turned instance".into()))
-                .with_remedy("export the assembly as one flat part"));
-        }
-        let Scope { first, end, .. } = self.scopes[scope];
-        for point in &mut self.points[first..end] {
-            *point += shift;
-        }
-        Ok(())
+    /// Whether a node is named with its instance: `INSTANCE.NUMBER`.
+    fn is_of_instance(&self, item: &[u8]) -> bool {
+        let Some(point) = item.iter().rposition(|&b| b == b'.') else { return false };
+        let name = String::from_utf8_lossy(&item[..point]).to_ascii_uppercase();
+        self.instances.contains_key(name.trim_matches('"'))
     }
 
     fn end_block(&mut self, place: Place) -> Result<(), FormatError> {
@@ -360,41 +391,5 @@ impl Reader {
             0 => Ok(()),
             _ => Err(FormatError::new(place, Reason::Truncated { within: "an element" })),
         }
-    }
-
-    fn finish(self) -> Result<(Soup, ReadCounts), FormatError> {
-        if self.points.len() >= u32::MAX as usize || self.elements.len() >= u32::MAX as usize {
-            let limit = u64::from(u32::MAX) - 1;
-            return Err(FormatError::new(Place::File, Reason::TooMany { what: "nodes or elements", limit }));
-        }
-        let mut elements = Elements::new(self.points.len());
-        let mut placed = Vec::with_capacity(self.elements.len());
-        let mut begin = 0;
-        let mut nodes = Vec::new();
-        for raw in &self.elements {
-            nodes.clear();
-            let known = &self.scopes[raw.scope as usize].nodes;
-            for &id in &self.element_nodes[begin..raw.end] {
-                let missing = || {
-                    let (place, count) = (Place::Line(raw.line), known.len() as u64);
-                    FormatError::new(place, Reason::OutOfRange { what: "node", index: id, count })
-                };
-                nodes.push(*known.get(&id).ok_or_else(missing)?);
-            }
-            begin = raw.end;
-            placed.push(match raw.shape {
-                Some(shape) => elements.add(shape, &nodes, &self.points),
-                None => elements.leave_out(),
-            });
-        }
-        let mut soup = Soup { points: self.points.into(), ..Soup::default() };
-        let sides: Vec<_> = elements.faces.clone();
-        let (groups, notes) = Sets::resolve(&self.scopes, self.cards, &placed, &sides, soup.points.len())?;
-        soup.carried.groups = groups;
-        let mut counts = elements.finish(&mut soup)?;
-        for note in &notes {
-            counts.note(note);
-        }
-        Ok((soup, counts))
     }
 }

@@ -1,11 +1,11 @@
-//! Gmsh meshes (`.msh`), versions 2.2 and 4.1, text and binary.
+//! Gmsh meshes (`.msh`), versions 2.2, 4.0 and 4.1, text and binary.
 //!
 //! Layout after C. Geuzaine, J.-F. Remacle: Gmsh, a 3-D finite element mesh generator with built-in pre- and
 //! post-processing facilities, International Journal for Numerical Methods in Engineering 79, 2009, and the file format
 //! chapter of Gmsh's reference manual.
 //!
 //! Reading: triangles and quads of any order become faces (only corners are used), lines edges, points vertices;
-//! volumes are left out. A physical group becomes a face, edge or vertex group after its dimension, `physical_TAG` where
+//! volumes are left out, except where there is nothing else: then their skin is the mesh, with their groups. A physical group becomes a face, edge or vertex group after its dimension, `physical_TAG` where
 //! it has no name. A file without physical groups gives its elementary entities as groups: `surface_TAG` where there
 //! are several surfaces, and `curve_TAG`. In version 2 an element of several groups is written once for each of them:
 //! elements of equal nodes and entity in different groups are one face. The pieces of a partitioned mesh count as the
@@ -82,6 +82,16 @@ const ELEMENT_TYPES: [(i64, u8, usize); 38] = [
 /// The dimension and the number of nodes of an element type.
 fn element_type(number: i64) -> Option<(u8, usize)> {
     ELEMENT_TYPES.iter().find(|&&(n, ..)| n == number).map(|&(_, dimension, nodes)| (dimension, nodes))
+}
+
+/// The corners of a three-dimensional element type.
+fn volume_corners(number: i64) -> usize {
+    match number {
+        4 | 11 | 29..=31 => 4,
+        7 | 14 | 19 => 5,
+        6 | 13 | 18 => 6,
+        _ => 8,
+    }
 }
 
 /// Whether a two-dimensional element type has four corners.

@@ -10,7 +10,7 @@ use super::super::binary::ByteOrder;
 use super::super::element::{Elements, Placed, Shape};
 use super::super::error::{FormatError, Place, Reason};
 use super::super::mixed::Input;
-use super::{element_type, is_quad, v2, v4};
+use super::{element_type, is_quad, v2, v4, volume_corners};
 use crate::mesh::{EdgeKey, FaceId, Field, Soup, Support, VertexId};
 use crate::watch::Watch;
 
@@ -26,6 +26,7 @@ struct Members {
     faces: Vec<FaceId>,
     edges: Vec<EdgeKey>,
     vertices: Vec<VertexId>,
+    volumes: Vec<u32>,
 }
 
 impl Members {
@@ -34,6 +35,7 @@ impl Members {
             Placed::Faces(range) => self.faces.extend(range.clone().map(FaceId::new)),
             Placed::Edge(edge) => self.edges.push(*edge),
             Placed::Vertex(vertex) => self.vertices.push(*vertex),
+            Placed::Volume(volume) => self.volumes.push(*volume),
             Placed::Nothing => {}
         }
     }
@@ -69,13 +71,17 @@ pub(super) struct Model<'w> {
     count: usize,
     memberships: usize,
     watch: Option<&'w Watch>,
+    /// Version 4.0.
+    pub(super) old: bool,
 }
 
 /// Reads a Gmsh file.
 pub(super) fn read(bytes: &[u8], watch: &Watch) -> Result<(Soup, ReadCounts), FormatError> {
     let mut input = Input::new(bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes));
     let mut model = Model { watch: Some(watch), ..Model::default() };
-    let version_4 = mesh_format(&mut input)?;
+    let version = mesh_format(&mut input)?;
+    let version_4 = version != Version::Two;
+    model.old = version == Version::Four;
     while let Some(word) = input.word() {
         let Some(name) = word.strip_prefix(b"$") else {
             return Err(FormatError::unexpected(input.place(), "the beginning of a section", word));
@@ -106,16 +112,28 @@ pub(super) fn read(bytes: &[u8], watch: &Watch) -> Result<(Soup, ReadCounts), Fo
     model.finish()
 }
 
-/// Reads the head; `true` for version 4.1.
-fn mesh_format(input: &mut Input<'_>) -> Result<bool, FormatError> {
+/// Versions as they differ.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Version {
+    /// 2.0 to 2.2.
+    Two,
+    /// 4.0.
+    Four,
+    /// 4.1.
+    FourOne,
+}
+
+/// Reads the head.
+fn mesh_format(input: &mut Input<'_>) -> Result<Version, FormatError> {
     let first = input.need_word("the head")?;
     if first != b"$MeshFormat" {
         return Err(FormatError::unexpected(input.place(), "$MeshFormat", first));
     }
     let version = input.need_word("the version")?;
-    let version_4 = match version {
-        b"2" | b"2.0" | b"2.1" | b"2.2" => false,
-        b"4.1" => true,
+    let version = match version {
+        b"2" | b"2.0" | b"2.1" | b"2.2" => Version::Two,
+        b"4" | b"4.0" => Version::Four,
+        b"4.1" => Version::FourOne,
         other => {
             let what = format!("version {}", String::from_utf8_lossy(other));
             return Err(FormatError::new(input.place(), Reason::Unsupported(what))
@@ -143,7 +161,7 @@ fn mesh_format(input: &mut Input<'_>) -> Result<bool, FormatError> {
         };
     }
     match input.need_word("the head")? {
-        b"$EndMeshFormat" => Ok(version_4),
+        b"$EndMeshFormat" => Ok(version),
         other => Err(FormatError::unexpected(input.place(), "$EndMeshFormat", other)),
     }
 }
@@ -230,7 +248,10 @@ impl Model<'_> {
             2 => Shape::Triangle,
             _ => Shape::Volume,
         };
-        let placed = self.elements.add(shape, nodes, &self.points);
+        let placed = match shape {
+            Shape::Volume => self.elements.volume(nodes, volume_corners(kind)),
+            _ => self.elements.add(shape, nodes, &self.points),
+        };
         if let Placed::Faces(range) = &placed {
             self.face_tags.push((tag, range.start as u32));
         }
@@ -295,6 +316,12 @@ impl Model<'_> {
     }
 
     fn finish(mut self) -> Result<(Soup, ReadCounts), FormatError> {
+        if let Some(ranges) = self.elements.skin(&self.points) {
+            for members in self.groups.values_mut().chain(self.entities.values_mut()) {
+                let faces = members.volumes.iter().filter_map(|&volume| ranges.get(volume as usize));
+                members.faces.extend(faces.flat_map(|range| range.clone().map(FaceId::new)));
+            }
+        }
         let mut soup = Soup { points: std::mem::take(&mut self.points).into(), ..Soup::default() };
         let faces = self.elements.faces.len();
         for data in std::mem::take(&mut self.data) {
@@ -330,11 +357,12 @@ impl Model<'_> {
         let names = std::mem::take(&mut self.names);
         let mut named = Vec::new();
         if self.groups.is_empty() {
-            let surfaces = self.entities.values().filter(|m| !m.faces.is_empty()).count();
+            let with_faces = self.entities.values().filter(|m| !m.faces.is_empty()).count();
             for ((dimension, tag), members) in std::mem::take(&mut self.entities) {
                 match dimension {
                     1 => named.push((format!("curve_{tag}"), members)),
-                    2 if surfaces > 1 => named.push((format!("surface_{tag}"), members)),
+                    2 if with_faces > 1 => named.push((format!("surface_{tag}"), members)),
+                    3 if with_faces > 1 => named.push((format!("volume_{tag}"), members)),
                     _ => {}
                 }
             }

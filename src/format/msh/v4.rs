@@ -1,4 +1,7 @@
-//! The sections of version 4.1 that differ from version 2.
+//! The sections of versions 4.0 and 4.1 that differ from version 2.
+//!
+//! Version 4.0 has the tag of an entity before its dimension, a box of six numbers at points too, node and element
+//! numbers of 32 bits, each node's number beside its coordinates, and fewer counts.
 
 use smallvec::SmallVec;
 
@@ -14,7 +17,7 @@ pub(super) fn entities(input: &mut Input<'_>, model: &mut Model<'_>) -> Result<(
     for (dimension, count) in (0..).zip(entity_counts(input)?) {
         for _ in 0..count {
             let tag = input.int("the tag of an entity")?;
-            let groups = bounds_and_groups(input, dimension)?;
+            let groups = bounds_and_groups(input, dimension, model.old)?;
             model.entity((dimension, tag), groups);
         }
     }
@@ -39,7 +42,7 @@ pub(super) fn partitioned_entities(input: &mut Input<'_>, model: &mut Model<'_>)
             for _ in 0..input.claim(partitions, 2, 4, "partitions")? {
                 input.int("a partition")?;
             }
-            let groups = bounds_and_groups(input, dimension)?;
+            let groups = bounds_and_groups(input, dimension, model.old)?;
             model.piece((dimension, tag), parent, groups);
         }
     }
@@ -57,8 +60,8 @@ fn entity_counts(input: &mut Input<'_>) -> Result<[usize; 4], FormatError> {
 }
 
 /// The physical groups of an entity; what bounds it is not used.
-fn bounds_and_groups(input: &mut Input<'_>, dimension: i64) -> Result<Vec<i64>, FormatError> {
-    for _ in 0..if dimension == 0 { 3 } else { 6 } {
+fn bounds_and_groups(input: &mut Input<'_>, dimension: i64, old: bool) -> Result<Vec<i64>, FormatError> {
+    for _ in 0..if dimension == 0 && !old { 3 } else { 6 } {
         // Boxes of entities without nodes may be infinite.
         input.any_float("a bound of an entity")?;
     }
@@ -77,25 +80,47 @@ fn bounds_and_groups(input: &mut Input<'_>, dimension: i64) -> Result<Vec<i64>, 
     Ok(groups)
 }
 
-/// `$Nodes`.
-pub(super) fn nodes(input: &mut Input<'_>, model: &mut Model<'_>) -> Result<(), FormatError> {
+/// The head of a section: how many blocks there are.
+fn blocks(input: &mut Input<'_>, what: &'static str, old: bool) -> Result<usize, FormatError> {
     input.end_line();
     let blocks = input.size("a number of blocks")?;
-    for _ in 0..3 {
-        input.size("a number of nodes")?;
+    for _ in 0..if old { 1 } else { 3 } {
+        input.size(what)?;
     }
-    for _ in 0..input.claim(blocks, 8, 20, "blocks of nodes")? {
-        let dimension = input.int("a dimension")?;
-        input.int("the tag of an entity")?;
+    input.claim(blocks, 8, 20, "blocks")
+}
+
+/// The dimension and the tag of a block's entity.
+fn block_entity(input: &mut Input<'_>, old: bool) -> Result<(i64, i64), FormatError> {
+    let first = input.int("a dimension or tag of an entity")?;
+    let second = input.int("a dimension or tag of an entity")?;
+    Ok(if old { (second, first) } else { (first, second) })
+}
+
+/// A node or element number.
+fn number(input: &mut Input<'_>, what: &'static str, old: bool) -> Result<i64, FormatError> {
+    if old { input.int(what) } else { input.size(what) }
+}
+
+/// `$Nodes`.
+pub(super) fn nodes(input: &mut Input<'_>, model: &mut Model<'_>) -> Result<(), FormatError> {
+    let old = model.old;
+    for _ in 0..blocks(input, "a number of nodes", old)? {
+        let (dimension, _) = block_entity(input, old)?;
         let parametric = input.int("whether nodes have parameters")? != 0;
         let announced = input.size("a number of nodes")?;
-        let count = input.claim(announced, 8, 32, "nodes")?;
+        let count = input.claim(announced, 8, if old { 28 } else { 32 }, "nodes")?;
         let place = input.place();
-        let mut tags = Vec::with_capacity(count);
-        for _ in 0..count {
+        let mut tags = Vec::with_capacity(if old { 0 } else { count });
+        for _ in 0..if old { 0 } else { count } {
             tags.push(input.size("a node number")?);
         }
-        for tag in tags {
+        let mut tags = tags.into_iter();
+        for _ in 0..count {
+            let tag = match tags.next() {
+                Some(tag) => tag,
+                None => input.int("a node number")?,
+            };
             let point = point(input)?;
             for _ in 0..if parametric { dimension.clamp(0, 3) } else { 0 } {
                 input.float("a parameter of a node")?;
@@ -109,25 +134,21 @@ pub(super) fn nodes(input: &mut Input<'_>, model: &mut Model<'_>) -> Result<(), 
 
 /// `$Elements`.
 pub(super) fn elements(input: &mut Input<'_>, model: &mut Model<'_>) -> Result<(), FormatError> {
-    input.end_line();
-    let blocks = input.size("a number of blocks")?;
-    for _ in 0..3 {
-        input.size("a number of elements")?;
-    }
-    for _ in 0..input.claim(blocks, 8, 20, "blocks of elements")? {
-        let dimension = input.int("a dimension")?;
+    let old = model.old;
+    for _ in 0..blocks(input, "a number of elements", old)? {
         let place = input.place();
-        let entity = input.int("the tag of an entity")?;
+        let entity = block_entity(input, old)?;
         let kind = input.int("an element type")?;
         let announced = input.size("a number of elements")?;
         let Some((_, nodes)) = element_type(kind) else { return Err(unknown(kind, place)) };
-        let (whole, groups) = model.groups_of((dimension, entity), place)?;
-        for _ in 0..input.claim(announced, 2 + 2 * nodes, 8 + 8 * nodes, "elements")? {
+        let (whole, groups) = model.groups_of(entity, place)?;
+        let bytes = if old { 4 + 4 * nodes } else { 8 + 8 * nodes };
+        for _ in 0..input.claim(announced, 2 + 2 * nodes, bytes, "elements")? {
             let place = input.place();
-            let tag = input.size("an element number")?;
+            let tag = number(input, "an element number", old)?;
             let mut positions: SmallVec<[u32; 8]> = SmallVec::new();
             for _ in 0..nodes {
-                let node = input.size("a node number")?;
+                let node = number(input, "a node number", old)?;
                 positions.push(model.position(node, place)?);
             }
             let placed = model.element(tag, kind, whole, &positions)?;

@@ -126,6 +126,7 @@ pub(in super::super) mod cell {
     pub(in super::super::super) const POLYGON: u8 = 7;
     pub(in super::super::super) const PIXEL: u8 = 8;
     pub(in super::super::super) const QUAD: u8 = 9;
+    pub(in super::super::super) const VOXEL: u8 = 11;
     pub(in super::super::super) const QUADRATIC_TRIANGLE: u8 = 22;
     pub(in super::super::super) const QUADRATIC_QUAD: u8 = 23;
 }
@@ -146,6 +147,8 @@ struct Origins {
     faces: Vec<u32>,
     /// The edges with their cells.
     edges: Vec<(EdgeKey, u32)>,
+    /// The cells that are volumes.
+    volumes: Vec<u32>,
 }
 
 impl DataSet {
@@ -244,10 +247,16 @@ impl DataSet {
         for (i, (&kind, &end)) in self.types.iter().zip(&self.ends).enumerate() {
             let nodes = &self.connectivity[begin..end];
             begin = end;
+            if let Some(corners) = volume_corners(kind).filter(|&corners| corners <= nodes.len()) {
+                let voxel: Vec<u32> = VOXEL.iter().filter(|_| kind == cell::VOXEL).map(|&c| nodes[c]).collect();
+                elements.volume(if voxel.is_empty() { nodes } else { &voxel }, corners);
+                origins.volumes.push(i as u32);
+                continue;
+            }
             let mut put = |shape: Shape, nodes: &[u32]| match elements.add(shape, nodes, points) {
                 Placed::Faces(range) => origins.faces.extend(range.map(|_| i as u32)),
                 Placed::Edge(edge) => origins.edges.push((edge, i as u32)),
-                Placed::Vertex(_) | Placed::Nothing => {}
+                Placed::Vertex(_) | Placed::Volume(_) | Placed::Nothing => {}
             };
             match kind {
                 cell::VERTEX | cell::POLY_VERTEX => nodes.iter().for_each(|&n| put(Shape::Point, &[n])),
@@ -262,6 +271,10 @@ impl DataSet {
                     put(shape, nodes);
                 }
             }
+        }
+        if let Some(ranges) = elements.skin(points) {
+            origins.faces =
+                origins.volumes.iter().zip(ranges).flat_map(|(&cell, faces)| faces.map(move |_| cell)).collect();
         }
         Ok(origins)
     }
@@ -343,7 +356,21 @@ fn shape_of(kind: u8) -> Option<Shape> {
         cell::POLYGON => Some(Shape::Polygon),
         cell::QUAD | cell::QUADRATIC_QUAD | 28 | 30 | 70 | 77 => Some(Shape::Quad),
         21 | 35 | 68 | 75 => Some(Shape::Line),
-        10..=16 | 24..=27 | 29 | 31..=33 | 37 | 42 | 71..=74 | 78..=81 => Some(Shape::Volume),
+        _ => None,
+    }
+}
+
+/// The corners of a voxel in the order of a brick's.
+const VOXEL: [usize; 8] = [0, 1, 3, 2, 4, 5, 7, 6];
+
+/// How many of the first points of a volume cell are its corners, 0 where its sides are not known; `None` of other cells.
+fn volume_corners(kind: u8) -> Option<usize> {
+    match kind {
+        10 | 24 | 71 | 78 => Some(4),
+        14 | 27 | 37 | 74 | 81 => Some(5),
+        13 | 26 | 31 | 32 | 73 | 80 => Some(6),
+        cell::VOXEL | 12 | 25 | 29 | 33 | 72 | 79 => Some(8),
+        15 | 16 | 42 => Some(0),
         _ => None,
     }
 }

@@ -1,0 +1,277 @@
+//! Decks that include other files: each directive is replaced by the file's lines between two comments, which tell the
+//! places of errors. The caller opens the files; formats open none.
+//!
+//! Abaqus and CalculiX write `*INCLUDE, INPUT=file`, Nastran `INCLUDE 'file'`, where a quoted name may go on in the next
+//! lines. A file may include others, at most [`DEEPEST`] deep; one that includes itself is refused.
+//!
+//! Linear in the size of all files; the caller bounds that.
+
+use std::path::PathBuf;
+
+use super::Format;
+use super::error::{FormatError, Place, Reason};
+
+/// So deep files may include each other.
+pub const DEEPEST: usize = 16;
+/// A quoted name of a Nastran deck goes over this many lines at most.
+const MOST_LINES: usize = 8;
+
+const BEGIN: &[u8] = b" meshmill: from here on, ";
+const END: &[u8] = b" meshmill: up to here";
+
+/// An included file: what tells it from others, and its bytes.
+pub type Opened = (PathBuf, Vec<u8>);
+/// Opens a file by the name that the deck gives it, or says why not.
+pub type Open<'a> = dyn FnMut(&str) -> Result<Opened, String> + 'a;
+
+impl Format {
+    /// Whether files of this format may include others.
+    pub fn has_includes(self) -> bool {
+        matches!(self, Self::Inp | Self::Bdf)
+    }
+}
+
+/// The deck with all files that it includes; `None` where it includes none.
+///
+/// # Errors
+/// Where a file cannot be opened, includes itself or is included too deep, with the line of the directive.
+pub fn expand(format: Format, bytes: &[u8], open: &mut Open<'_>) -> Result<Option<Vec<u8>>, FormatError> {
+    if !format.has_includes() || next(format, bytes, 0).is_none() {
+        return Ok(None);
+    }
+    let mut expansion = Expansion { format, open, out: Vec::with_capacity(2 * bytes.len()), stack: Vec::new() };
+    expansion.add(bytes).map_err(|error| error.in_format(format))?;
+    Ok(Some(expansion.out))
+}
+
+/// The file and the line in it that line `line` of an expanded deck comes from; no file for the deck itself.
+pub(super) fn locate(bytes: &[u8], line: u64) -> (Option<String>, u64) {
+    let mut stack: Vec<(Option<String>, u64)> = vec![(None, 0)];
+    for (raw, number) in bytes.split(|&b| b == b'\n').zip(1..=line) {
+        let comment = raw.strip_prefix(b"**").or_else(|| raw.strip_prefix(b"$")).unwrap_or_default();
+        if comment == END && stack.len() > 1 {
+            stack.pop();
+            continue;
+        }
+        if let Some(top) = stack.last_mut() {
+            top.1 += 1;
+        }
+        if let Some(name) = comment.strip_prefix(BEGIN).filter(|_| number < line) {
+            stack.push((Some(String::from_utf8_lossy(name).into_owned()), 0));
+        }
+    }
+    stack.pop().unwrap_or((None, line))
+}
+
+/// An include in a deck.
+struct Directive {
+    /// Where it begins, and where the line after it begins.
+    begin: usize,
+    end: usize,
+    /// How many lines it has.
+    lines: usize,
+    name: String,
+}
+
+/// The first directive at or after the line that begins at `from`.
+fn next(format: Format, bytes: &[u8], from: usize) -> Option<Directive> {
+    let mut begin = from;
+    while begin < bytes.len() {
+        let end = line_end(bytes, begin);
+        let line = bytes[begin..end].trim_ascii();
+        let found = match format {
+            Format::Inp if is_keyword(line, b"*INCLUDE") => Some(inp_directive(bytes, begin)),
+            Format::Bdf if is_keyword(line, b"INCLUDE") => Some(bdf_directive(bytes, begin)),
+            // Nothing after it is read.
+            Format::Bdf if line.get(..7).is_some_and(|w| w.eq_ignore_ascii_case(b"ENDDATA")) => return None,
+            _ => None,
+        };
+        if found.is_some() {
+            return found;
+        }
+        begin = end;
+    }
+    None
+}
+
+/// Where the line after the one at `begin` begins.
+fn line_end(bytes: &[u8], begin: usize) -> usize {
+    bytes[begin..].iter().position(|&b| b == b'\n').map_or(bytes.len(), |length| begin + length + 1)
+}
+
+fn is_keyword(line: &[u8], keyword: &[u8]) -> bool {
+    let (word, rest) = line.split_at(line.len().min(keyword.len()));
+    word.eq_ignore_ascii_case(keyword) && rest.first().is_none_or(|b| !b.is_ascii_alphanumeric())
+}
+
+/// `*INCLUDE, INPUT=file`, which goes on in the next line after a comma at the end.
+fn inp_directive(bytes: &[u8], begin: usize) -> Directive {
+    let (mut end, mut lines) = (begin, 0);
+    let mut text = String::new();
+    while (lines == 0 || text.ends_with(',')) && end < bytes.len() {
+        let after = line_end(bytes, end);
+        text.push_str(String::from_utf8_lossy(bytes[end..after].trim_ascii()).as_ref());
+        (end, lines) = (after, lines + 1);
+    }
+    let input = |part: &str| {
+        let (key, value) = part.split_once('=')?;
+        key.trim().eq_ignore_ascii_case("INPUT").then(|| value.trim().trim_matches(['"', '\'']).to_owned())
+    };
+    let name = text.split(',').find_map(input).unwrap_or_default();
+    Directive { begin, end, lines, name }
+}
+
+/// `INCLUDE 'file'`, which goes on in the next lines until the quote ends.
+fn bdf_directive(bytes: &[u8], begin: usize) -> Directive {
+    let mut end = line_end(bytes, begin);
+    let line = String::from_utf8_lossy(&bytes[begin..end]);
+    let rest = line.trim().get("INCLUDE".len()..).unwrap_or_default().trim_start_matches([' ', '\t', '=']);
+    let Some(quote) = rest.chars().next().filter(|c| matches!(c, '\'' | '"')) else {
+        let name = rest.split([' ', '\t', '$']).next().unwrap_or_default().to_owned();
+        return Directive { begin, end, lines: 1, name };
+    };
+    let mut name = rest[1..].trim_end().to_owned();
+    let mut lines = 1;
+    while !name.contains(quote) && lines < MOST_LINES && end < bytes.len() {
+        let after = line_end(bytes, end);
+        name.push_str(String::from_utf8_lossy(bytes[end..after].trim_ascii()).as_ref());
+        (end, lines) = (after, lines + 1);
+    }
+    let name = name.split(quote).next().unwrap_or_default().to_owned();
+    Directive { begin, end, lines, name }
+}
+
+struct Expansion<'a, 'b> {
+    format: Format,
+    open: &'a mut Open<'b>,
+    out: Vec<u8>,
+    /// The files that are being read, from the outermost on, with their names.
+    stack: Vec<(PathBuf, String)>,
+}
+
+impl Expansion<'_, '_> {
+    fn add(&mut self, bytes: &[u8]) -> Result<(), FormatError> {
+        let mut from = 0;
+        while let Some(directive) = next(self.format, bytes, from) {
+            self.out.extend_from_slice(&bytes[from..directive.begin]);
+            from = directive.end;
+            let line = 1 + bytes[..directive.begin].iter().map(|&b| u64::from(b == b'\n')).sum::<u64>();
+            self.include(&directive).map_err(|why| self.error(line, &directive.name, why))?;
+        }
+        self.out.extend_from_slice(&bytes[from..]);
+        Ok(())
+    }
+
+    fn include(&mut self, directive: &Directive) -> Result<(), Why> {
+        if directive.name.is_empty() {
+            return Err(Why::Here("the directive names no file".to_owned()));
+        }
+        if self.stack.len() == DEEPEST {
+            return Err(Why::Here(format!("files are included more than {DEEPEST} deep")));
+        }
+        let (file, bytes) = (self.open)(&directive.name).map_err(Why::Here)?;
+        if self.stack.iter().any(|(known, _)| *known == file) {
+            return Err(Why::Here("the file includes itself".to_owned()));
+        }
+        let mark: &[u8] = if self.format == Format::Inp { b"**" } else { b"$" };
+        for _ in 1..directive.lines {
+            self.out.extend([mark, b"\n"].concat());
+        }
+        let printable: String = directive.name.chars().map(|c| if c.is_control() { '_' } else { c }).collect();
+        self.out.extend([mark, BEGIN, printable.as_bytes(), b"\n"].concat());
+        self.stack.push((file, directive.name.clone()));
+        self.add(&bytes).map_err(|error| Why::Within(Box::new(error)))?;
+        self.stack.pop();
+        if self.out.last() != Some(&b'\n') {
+            self.out.push(b'\n');
+        }
+        self.out.extend([mark, END, b"\n"].concat());
+        Ok(())
+    }
+
+    fn error(&self, line: u64, name: &str, why: Why) -> FormatError {
+        match why {
+            Why::Within(error) => *error,
+            Why::Here(why) => {
+                let mut error = FormatError::new(Place::Line(line), Reason::Include { name: name.to_owned(), why })
+                    .with_remedy(
+                        "put it beside the deck or in a folder there, or put its lines in the directive's place",
+                    );
+                error.included = self.stack.last().map(|(_, name)| name.clone());
+                error
+            }
+        }
+    }
+}
+
+/// Why a file is not included: a reason for the directive at hand, or an error within the file.
+enum Why {
+    Here(String),
+    Within(Box<FormatError>),
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn expanded(format: Format, deck: &str, files: &[(&str, &str)]) -> Result<String, String> {
+        let mut open = |name: &str| match files.iter().find(|(known, _)| *known == name) {
+            Some((_, text)) => Ok((PathBuf::from(name), text.as_bytes().to_vec())),
+            None => Err("there is no such file".to_owned()),
+        };
+        let found = expand(format, deck.as_bytes(), &mut open).map_err(|error| error.to_string())?;
+        Ok(String::from_utf8(found.unwrap_or_else(|| deck.into())).expect("text"))
+    }
+
+    #[test]
+    fn directives_are_replaced_by_lines_which_keep_their_places() {
+        let files = [("a b.inc", "1, 0\n*include,\ninput=c.inc"), ("c.inc", "2, 0")];
+        let deck = "*NODE\n*INCLUDE, INPUT=\"a b.inc\"\n3, 0\n";
+        let text = expanded(Format::Inp, deck, &files).unwrap();
+        let places: Vec<_> = (1..).zip(text.lines()).filter(|(_, line)| !line.starts_with("**")).collect();
+        let places: Vec<_> = places.iter().map(|(n, line)| (*line, locate(text.as_bytes(), *n))).collect();
+        let within = |name: &str| Some(name.to_owned());
+        assert_eq!(
+            places,
+            [
+                ("*NODE", (None, 1)),
+                ("1, 0", (within("a b.inc"), 1)),
+                ("2, 0", (within("c.inc"), 1)),
+                ("3, 0", (None, 3))
+            ]
+        );
+    }
+
+    #[test]
+    fn names_of_nastran_may_go_over_lines() {
+        let files = [("model/grid.inc", "GRID,1\n")];
+        for deck in [
+            "INCLUDE 'model/grid.inc'\nX\n",
+            "include \"model/grid.inc\" $ the grid\nX\n",
+            "INCLUDE model/grid.inc\nX\n",
+            "INCLUDE 'model/\n  grid.inc'\nX\n",
+            "  Include 'model/grid.inc'\r\nX\n",
+        ] {
+            let text = expanded(Format::Bdf, deck, &files).unwrap();
+            assert!(text.contains("\nGRID,1\n") && text.ends_with("\nX\n"), "{text}");
+            let last = text.lines().count() as u64;
+            assert_eq!(locate(text.as_bytes(), last), (None, deck.lines().count() as u64), "{deck}");
+        }
+        for deck in ["$ INCLUDE 'x'\n", "INCLUDED\n", "TITLE = INCLUDE x\n", "ENDDATA\nINCLUDE 'x'\n"] {
+            assert_eq!(expanded(Format::Bdf, deck, &files).unwrap(), deck);
+        }
+    }
+
+    #[test]
+    fn circles_and_missing_files_are_refused_with_their_place() {
+        let files = [("a", "**\n*INCLUDE, INPUT=b\n"), ("b", "*INCLUDE, INPUT=a\n"), ("c", "\n*INCLUDE, INPUT=none\n")];
+        for (deck, message) in [
+            ("*INCLUDE, INPUT=a\n", "b, line 1: `a` is not included: the file includes itself"),
+            ("\n*INCLUDE, INPUT=c\n", "c, line 2: `none` is not included: there is no such file"),
+            ("*INCLUDE\n", "line 1: `` is not included: the directive names no file"),
+        ] {
+            let error = expanded(Format::Inp, deck, &files).unwrap_err();
+            assert!(error.ends_with(message), "{error}");
+        }
+    }
+}
