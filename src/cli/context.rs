@@ -1,5 +1,6 @@
 //! What several subcommands share: the arguments that choose a recipe, its plan, and the cache.
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -158,14 +159,10 @@ fn unusable_name(folder: &Path, part: &glob::Pattern, is_last: bool) -> Result<(
 }
 
 impl Planned {
-    /// The files that the recipe consists of and those that it reads.
+    /// The files that the recipe consists of and those that it reads, with all that they include.
     pub(super) fn files(&self) -> Vec<PathBuf> {
         let texts = texts(&self.recipe).into_iter().map(|(name, _)| PathBuf::from(name));
-        let read = self.plan.order().filter_map(|id| match &self.plan.node(id).task {
-            plan::Task::Source(source) => Some(source.path.clone()),
-            plan::Task::Step(_) | plan::Task::Gate(_) => None,
-        });
-        texts.chain(read).collect()
+        texts.chain(run::source::files(&self.plan)).collect()
     }
 
     /// All of them as they are now, before the run reads them. A recipe counts only while its file holds the text that
@@ -176,7 +173,19 @@ impl Planned {
             let text = texts.iter().find(|(name, _)| Path::new(name) == file);
             Seen::of(&file, text.map(|(_, text)| text.as_bytes()))
         };
-        self.files().into_iter().map(see).collect()
+        // Which files a deck includes is known only by reading it: what is seen before that says whether it is still so.
+        let (mut files, mut seen) = (BTreeSet::new(), Vec::new());
+        loop {
+            let before = seen.len();
+            for file in self.files() {
+                if files.insert(file.clone()) {
+                    seen.push(see(file));
+                }
+            }
+            if seen.len() == before {
+                return seen;
+            }
+        }
     }
 
     /// Fails where a file that is to be written is one of those that are read, or of `others`, by whatever name.

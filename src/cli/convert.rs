@@ -1,11 +1,11 @@
 //! `meshmill convert`: a mesh from any format to any other, with all that it carries; what the other cannot hold is told.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::exit::{Exit, Fault, say};
 use crate::format::{self, Format, ReadCounts, WriteOptions};
 use crate::mesh::Soup;
+use crate::run::source::{self, SourceError};
 use crate::run::{VERSION, write_named};
 use crate::watch::Watch;
 
@@ -72,11 +72,15 @@ pub(super) fn read_mesh(path: &Path) -> Result<Soup, Fault> {
 }
 
 fn read_with_counts(path: &Path) -> Result<(Soup, ReadCounts), Fault> {
-    let bytes = fs::read(path).map_err(|error| Fault::usage(format!("cannot read {}: {error}", path.display())))?;
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let fault = |error: format::FormatError| {
         let help = error.remedy.clone();
         Fault::usage(format!("cannot read {}: {error}", path.display())).help_opt(help)
+    };
+    let bytes = match source::read(path) {
+        Ok(source) => source.bytes,
+        Err(SourceError::Include(error)) => return Err(fault(error)),
+        Err(SourceError::Io(error)) => return Err(Fault::usage(format!("cannot read {}: {error}", path.display()))),
     };
     let format = Format::detect(&name, &bytes).map_err(fault)?;
     format::read(format, &bytes, &Watch::silent()).map_err(fault)

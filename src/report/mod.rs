@@ -357,6 +357,10 @@ fn gate_section(names: &Names<'_>, gate: &Gate, outcome: &RunOutcome) -> GateSec
 fn step_report(names: &Names<'_>, outcome: &RunOutcome, (id, name): (TaskId, &str)) -> Option<StepReport> {
     let Task::Step(step) = &names.plan.node(id).task else { return None };
     let task = outcome.task(id);
+    // A file that cannot be read is no step of its own: the steps that read it say why.
+    let files = names.plan.inputs(id).into_iter().map(|(_, input)| input);
+    let mut files = files.filter(|input| matches!(names.plan.node(*input).task, Task::Source(_)));
+    let unread = files.find_map(|input| outcome.task(input).failure.clone());
     let figures = task.entry.as_ref().and_then(|entry| match &entry.outcome {
         Outcome::Artifact { figures, .. } => Some(figures.clone()),
         Outcome::Gate(_) | Outcome::File { .. } => None,
@@ -370,7 +374,7 @@ fn step_report(names: &Names<'_>, outcome: &RunOutcome, (id, name): (TaskId, &st
         record: task.entry.as_ref().map(|entry| entry.record.clone()).unwrap_or_default(),
         figures,
         stats: task.entry.as_ref().map(|entry| entry.stats.clone()),
-        failure: task.failure.clone(),
+        failure: task.failure.clone().or(unread),
         differs_from: task.differs.map(|(before, _)| before.to_hex().to_string()),
     })
 }

@@ -10,19 +10,17 @@ use std::time::SystemTime;
 
 use same_file::is_same_file;
 
-use super::{RunError, RunOptions};
-use crate::plan::{Plan, Task};
+use super::{RunError, RunOptions, source};
+use crate::plan::Plan;
 
 /// Files that the program writes into the folder of a run besides its outputs.
 const OWN: [&str; 6] = ["run.ron", "report.html", "sweep.csv", "sweep.ron", "sweep.html", "best.toml"];
 
 /// Fails where an output would replace what the run reads, or would be written through a link below the folder.
 pub(super) fn check(plan: &Plan, options: &RunOptions) -> Result<(), RunError> {
-    let sources = plan.order().filter_map(|id| match &plan.node(id).task {
-        Task::Source(source) => Some(source.path.as_path()),
-        Task::Step(_) | Task::Gate(_) => None,
-    });
-    let read: Vec<&Path> = sources.chain(options.protected.iter().map(PathBuf::as_path)).collect();
+    let sources = source::files(plan);
+    let read: Vec<&Path> =
+        sources.iter().map(PathBuf::as_path).chain(options.protected.iter().map(PathBuf::as_path)).collect();
     let mut by_stat: BTreeMap<(u64, Option<SystemTime>), Vec<&Path>> = BTreeMap::new();
     for &input in &read {
         by_stat.entry(fingerprint(input).unwrap_or_default()).or_default().push(input);

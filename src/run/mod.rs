@@ -32,6 +32,7 @@ mod patches;
 pub mod preview;
 mod schedule;
 mod shared;
+pub mod source;
 mod whole;
 
 use std::collections::BTreeSet;

@@ -1,7 +1,7 @@
 //! What a run would do, and why, without doing it. Uses the keys of the run, so that it cannot tell otherwise.
 
-use super::shared::{Shared, recipe_task, unreadable};
-use super::{RunOptions, tasks_of};
+use super::shared::{Shared, recipe_task};
+use super::{RunOptions, source, tasks_of};
 use crate::plan::{Change, Key, Plan, Record, SourceTask, Task, TaskId, task_record};
 use crate::step::StepFailure;
 use crate::store::{CODEC_VERSION, Store};
@@ -56,8 +56,8 @@ pub fn records(plan: &Plan, store: &Store, options: &RunOptions) -> Vec<Record> 
         let node = plan.node(id);
         let mut files = Vec::new();
         for (name, input) in plan.inputs(id) {
-            if let Task::Source(source) = &plan.node(input).task
-                && let Ok(hash) = shared.index.hash(&source.path)
+            if let Task::Source(file) = &plan.node(input).task
+                && let Ok(hash) = source::hash(&shared.index, &file.path)
             {
                 files.push((name, hash));
             }
@@ -104,13 +104,13 @@ fn fields(shared: &Shared<'_>, id: TaskId) -> Record {
     task_record(&shared.plan.node(id).task, u32::from(CODEC_VERSION), &contents)
 }
 
-fn source_forecast(shared: &Shared<'_>, id: TaskId, source: &SourceTask) -> Forecast {
-    match shared.index.hash(&source.path) {
+fn source_forecast(shared: &Shared<'_>, id: TaskId, file: &SourceTask) -> Forecast {
+    match source::hash(&shared.index, &file.path) {
         Ok(hash) => {
             shared.learn(id, hash);
             Forecast::Source
         }
-        Err(error) => Forecast::Unreadable(unreadable(&source.path, &error)),
+        Err(failure) => Forecast::Unreadable(failure),
     }
 }
 

@@ -12,7 +12,7 @@ use super::certify::FileNotes;
 use super::job::{self, Finished, Node};
 use super::observe::Observer;
 use super::outcome::{FileOutcome, FileState, RunOutcome, TaskOutcome};
-use super::shared::{Shared, unreadable};
+use super::shared::Shared;
 use super::{RunError, RunOptions, guard, output, tasks_of};
 use crate::plan::{Plan, SourceTask, Task, TaskId, in_case};
 use crate::step::{FailureKind, StepFailure};
@@ -295,14 +295,14 @@ impl<'a> Schedule<'a> {
     }
 
     fn hash_source(&mut self, node: usize, id: TaskId, source: &SourceTask) {
-        match self.shared.index.hash(&source.path) {
+        match super::source::hash(&self.shared.index, &source.path) {
             Ok(hash) => {
                 self.shared.learn(id, hash);
                 self.tasks[id.index()].content = Some(hash);
                 self.set(node, TaskState::Cached, None);
             }
-            Err(error) => {
-                self.tasks[id.index()].failure = Some(unreadable(&source.path, &error));
+            Err(failure) => {
+                self.tasks[id.index()].failure = Some(failure);
                 self.set(node, TaskState::Failed, None);
             }
         }

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use super::names::Needs;
-use super::{RunError, RunOptions};
+use super::{RunError, RunOptions, source};
 use crate::metric::gate::GateReport;
 use crate::plan::{ContentHash, Key, Plan, Record, Task, TaskId, task_key, task_record};
 use crate::step::{Artifact, FileBytes, StepFailure};
@@ -130,7 +130,7 @@ impl<'a> Shared<'a> {
     }
 
     fn source(&self, path: &Path, content: ContentHash) -> Result<Artifact, StepFailure> {
-        let (bytes, hash) = self.index.read(path).map_err(|error| unreadable(path, &error))?;
+        let (bytes, hash) = source::bytes(&self.index, path)?;
         if hash != content {
             return Err(StepFailure::bad_input(format!("{} changed while the run read it", path.display()))
                 .with_help("run again when nobody writes to it"));
@@ -165,8 +165,4 @@ impl<'a> Shared<'a> {
     pub(super) fn folder(&self, case: usize) -> PathBuf {
         self.options.out.join(&self.plan.cases()[case].name)
     }
-}
-
-pub(super) fn unreadable(path: &Path, error: &std::io::Error) -> StepFailure {
-    StepFailure::bad_input(format!("cannot read {}: {error}", path.display()))
 }

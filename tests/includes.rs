@@ -1,0 +1,141 @@
+//! Decks that include other files: read with them, from below their folder only, and up to date only while all are as they were.
+
+use std::fs;
+use std::path::PathBuf;
+
+use assert_cmd::Command;
+use predicates::prelude::*;
+
+const RECIPE: &str = "name = \"part\"\n[inputs]\npart = \"main.inp\"\n[steps.raw]\nuse = \"read\"\nfile = \"=inputs.part\"\n\
+    [outputs]\nraw = [\"result.obj\"]\n";
+
+const NODES: &str = "*NODE\n1, 0, 0, 0\n2, 1, 0, 0\n3, 0, 1, 0\n";
+
+const MAIN: &str = "*INCLUDE, INPUT=parts/mesh.inc\n*NSET, NSET=tip\n3,\n";
+
+struct Desk {
+    folder: tempfile::TempDir,
+}
+
+impl Desk {
+    /// A deck that includes a file, which includes another.
+    fn new() -> Self {
+        let desk = Self { folder: tempfile::tempdir().unwrap() };
+        desk.write("deck/recipe.toml", RECIPE);
+        desk.write("deck/main.inp", MAIN);
+        desk.write("deck/parts/mesh.inc", "*INCLUDE, INPUT=parts/nodes.inc\n*ELEMENT, TYPE=S3\n1, 1, 2, 3\n");
+        desk.write("deck/parts/nodes.inc", NODES);
+        desk
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    fn write(&self, name: &str, text: &str) {
+        fs::create_dir_all(self.path(name).parent().unwrap()).unwrap();
+        fs::write(self.path(name), text).unwrap();
+    }
+
+    fn text(&self, name: &str) -> String {
+        fs::read_to_string(self.path(name)).unwrap()
+    }
+
+    fn meshmill(&self, arguments: &[&str]) -> assert_cmd::assert::Assert {
+        let mut command = Command::new(assert_cmd::cargo::cargo_bin!("meshmill"));
+        command.current_dir(self.path("deck")).env("MESHMILL_CACHE", self.path("cache"));
+        command.args(arguments).assert()
+    }
+
+    fn run(&self) -> assert_cmd::assert::Assert {
+        self.meshmill(&["run", "recipe.toml", "--pictures", "none", "--out", "o"])
+    }
+}
+
+/// `measure` refuses the deck with this message.
+#[track_caller]
+fn refused(desk: &Desk, main: &str, message: &str) {
+    desk.write("deck/main.inp", main);
+    desk.meshmill(&["measure", "main.inp"]).code(2).stderr(predicate::str::contains(message));
+    desk.run().code(2).stderr(predicate::str::contains(message));
+}
+
+#[test]
+fn included_files_are_read_and_a_change_of_any_makes_another_result() {
+    let desk = Desk::new();
+    desk.run().success();
+    let first = desk.text("deck/o/result.obj");
+    desk.run().success();
+    assert_eq!(desk.text("deck/o/result.obj"), first);
+    desk.write("deck/parts/nodes.inc", &NODES.replace("2, 1, 0", "2, 7, 0"));
+    desk.run().success();
+    let second = desk.text("deck/o/result.obj");
+    assert!(second.contains("v 7 0 0"), "{second}");
+    desk.write(
+        "deck/parts/mesh.inc",
+        &format!("{}*ELEMENT, TYPE=S3\n1, 1, 2, 3\n", NODES.replace("2, 1, 0", "2, 9, 0")),
+    );
+    desk.run().success();
+    assert!(desk.text("deck/o/result.obj").contains("v 9 0 0"));
+}
+
+#[test]
+fn decks_of_nastran_include_too() {
+    let desk = Desk::new();
+    desk.write("deck/grid.inc", "GRID,1,,0.,0.,0.\nGRID,2,,1.,0.,0.\nGRID,3,,0.,1.,0.\n");
+    desk.write("deck/main.bdf", "BEGIN BULK\nINCLUDE 'grid.inc'\nCTRIA3,1,1,1,2,3\nENDDATA\n");
+    desk.meshmill(&["measure", "main.bdf"]).success();
+    desk.write("deck/main.bdf", "BEGIN BULK\nINCLUDE '.\\grid.inc'\nCTRIA3,1,1,1,2,x\nENDDATA\n");
+    desk.meshmill(&["measure", "main.bdf"]).code(2).stderr(predicate::str::contains("Nastran bulk data, line 3: "));
+    desk.write("deck/grid.inc", "GRID,1,,0.,0.,0.\nGRID,2,,1.,y,0.\n");
+    let told = "Nastran bulk data, .\\\\grid.inc, line 2: ";
+    desk.meshmill(&["measure", "main.bdf"]).code(2).stderr(predicate::str::contains(told));
+}
+
+#[test]
+fn nothing_is_included_from_outside_of_the_folder() {
+    let desk = Desk::new();
+    desk.write("secret.inc", NODES);
+    let whole = desk.path("secret.inc");
+    for name in ["../secret.inc", "parts/../../secret.inc", whole.to_str().unwrap()] {
+        refused(&desk, &format!("*INCLUDE, INPUT={name}\n"), "it lies outside of");
+    }
+    refused(&desk, "*NODE\n*INCLUDE, INPUT=none.inc\n", "line 2: `none.inc` is not included: there is no such file");
+    refused(&desk, "*INCLUDE, INPUT=parts\n", "it is not a file");
+    desk.write("deck/self.inc", "*INCLUDE, INPUT=self.inc\n");
+    refused(
+        &desk,
+        "*INCLUDE, INPUT=self.inc\n",
+        "self.inc, line 1: `self.inc` is not included: the file includes itself",
+    );
+}
+
+#[cfg(unix)]
+#[test]
+fn links_may_lead_anywhere_below_the_folder_and_nowhere_else() {
+    use std::os::unix::fs::symlink;
+    let desk = Desk::new();
+    desk.write("secret.inc", NODES);
+    symlink(desk.path("secret.inc"), desk.path("deck/out.inc")).unwrap();
+    symlink(desk.folder.path(), desk.path("deck/up")).unwrap();
+    symlink("parts/mesh.inc", desk.path("deck/in.inc")).unwrap();
+    refused(&desk, "*INCLUDE, INPUT=out.inc\n", "it lies outside of");
+    refused(&desk, "*INCLUDE, INPUT=up/secret.inc\n", "it lies outside of");
+    desk.write("deck/main.inp", "*INCLUDE, INPUT=in.inc\n");
+    desk.run().success();
+    // A link that leads to another file is another file.
+    desk.write("deck/other.inc", &format!("{}*ELEMENT, TYPE=S3\n1, 1, 2, 3\n", NODES.replace("2, 1, 0", "2, 5, 0")));
+    fs::remove_file(desk.path("deck/in.inc")).unwrap();
+    symlink("other.inc", desk.path("deck/in.inc")).unwrap();
+    desk.run().success();
+    assert!(desk.text("deck/o/result.obj").contains("v 5 0 0"));
+}
+
+#[test]
+fn an_output_does_not_replace_an_included_file() {
+    let desk = Desk::new();
+    desk.write("deck/o/result.obj", NODES);
+    desk.write("deck/main.inp", "*INCLUDE, INPUT=o/result.obj\n*ELEMENT, TYPE=S3\n1, 1, 2, 3\n");
+    desk.run().code(2).stderr(predicate::str::contains("which the run reads"));
+    assert_eq!(desk.text("deck/o/result.obj"), NODES);
+}
