@@ -351,3 +351,21 @@ fn the_report_of_a_sweep_shows_every_case() {
     desk.meshmill(&["report", "out/part-sweep", "--out", "again.html"]).assert().success();
     assert_eq!(fs::read_to_string(desk.path("again.html")).unwrap(), page);
 }
+
+#[test]
+fn what_a_reader_left_out_is_told_by_every_command_alike() {
+    let desk = Desk::new();
+    let deck = "*NODE\n1, 0, 0, 0\n2, 1, 0, 0\n3, 0, 1, 0\n4, 0, 0, 1\n*ELEMENT, TYPE=S3\n1, 1, 3, 2\n2, 1, 2, 4\n\
+        3, 2, 3, 4\n4, 1, 4, 3\n*SURFACE, NAME=s, COMBINE=UNION\nr\n";
+    fs::write(desk.path("part.inp"), deck).unwrap();
+    let told = || predicate::str::contains("left out on reading: surface `s` (line 11): COMBINE=UNION").count(1);
+    desk.meshmill(&["measure", "part.inp"]).assert().success().stderr(told());
+    desk.meshmill(&["convert", "part.inp", "part.off"]).assert().success().stderr(told());
+    let run = || desk.meshmill(&["run", "recipe.toml", "--input", "part=part.inp", "--pictures", "none"]).assert();
+    // Computed, from the cache, and when nothing has changed.
+    for _ in 0..3 {
+        run().success().stderr(told());
+    }
+    let sweep = ["sweep", "recipe.toml", "--input", "part=part.inp", "-s", "limit=0.1,0.2", "--pictures", "none"];
+    desk.meshmill(&sweep).assert().success().stderr(told());
+}

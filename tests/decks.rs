@@ -321,3 +321,41 @@ fn cards_that_nobody_knows_are_named_and_those_of_the_analysis_are_not() {
         assert!(error.contains("which makes or moves parts of the mesh"), "{card}: {error}");
     }
 }
+
+#[test]
+fn sides_of_volumes_are_their_faces_on_the_skin() {
+    let bricks = "*ELEMENT, TYPE=C3D8, ELSET=all\n1, 1,2,3,4,5,6,7,8\n2, 5,6,7,8,9,10,11,12\n";
+    let sides = "*SURFACE, NAME=bottom\n1, S1\n*SURFACE, NAME=x\nall, S4\n*SURFACE, NAME=top\n1, S2\n2, S2\n";
+    let deck = format!("{BRICKS}{bricks}{sides}");
+    let (soup, counts) = read(Format::Inp, deck.as_bytes(), &Watch::silent()).expect("two bricks");
+    let all_at = |name: &str, axis: usize, value: f64| {
+        let faces = &soup.carried.groups.faces[name];
+        let mut corners = faces.iter().flat_map(|&f| soup.faces[f].corners().to_vec());
+        assert!(corners.all(|v| soup.points[v][axis] == value), "{name}");
+        faces.len()
+    };
+    assert_eq!((all_at("bottom", 2, 0.0), all_at("x", 0, 1.0), all_at("top", 2, 2.0)), (1, 2, 1));
+    assert!(counts.left_out().contains(&"1 sides of surface `top` (line 22), which lie inside".to_owned()));
+    // Numbers of sides as Abaqus counts them, for each kind of volume.
+    for (kind, nodes, side, expected) in [
+        ("C3D4", "1,2,4,5", 2, [1, 2, 5].as_slice()),
+        ("C3D6", "1,2,3,5,6,7", 4, &[2, 3, 6, 7]),
+        ("C3D5", "5,6,7,8,13", 3, &[6, 7, 13]),
+        ("C3D8", "1,2,3,4,5,6,7,8", 6, &[1, 4, 5, 8]),
+    ] {
+        let deck = format!("{BRICKS}*ELEMENT, TYPE={kind}\n1, {nodes}\n*SURFACE, NAME=s\n1, S{side}\n*NSET, NSET=n\n1,2,3,4,5,6,7,8,9,10,11,12,13\n");
+        let (soup, _) = read(Format::Inp, deck.as_bytes(), &Watch::silent()).expect(kind);
+        let corners = soup.faces[soup.carried.groups.faces["s"][0]].corners();
+        let mut at: Vec<String> = corners.iter().map(|&v| soup.points[v].to_string()).collect();
+        let node = |n: &i32| {
+            let line = BRICKS.lines().find(|line| line.starts_with(&format!("{n},"))).expect("a node");
+            let mut numbers = line.split(',').skip(1).map(|x| x.parse::<f64>().expect("a number"));
+            let mut next = || numbers.next().expect("three");
+            dvec3(next(), next(), next()).to_string()
+        };
+        let mut expected: Vec<String> = expected.iter().map(node).collect();
+        at.sort();
+        expected.sort();
+        assert_eq!(at, expected, "{kind}");
+    }
+}

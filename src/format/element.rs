@@ -23,7 +23,7 @@ use rustc_hash::FxHashMap;
 
 use super::error::{FormatError, Place, Reason};
 use super::polygon::triangulate;
-use super::skin::{Volumes, volume_corners};
+use super::skin::{Own, Volumes, volume_corners};
 use super::{Element, ReadCounts, WriteOptions};
 use crate::mesh::{EdgeKey, Facet, Soup, Support, VertexId, edge_key};
 
@@ -66,6 +66,8 @@ pub(super) enum Placed {
     Edge(EdgeKey),
     /// It is a vertex.
     Vertex(VertexId),
+    /// It is a volume with these faces of the skin; a bit for each of its sides, in order, tells which sides those are.
+    Skin(std::ops::Range<usize>, u8),
     /// It is this volume, counted in the order of the file; its skin may be asked for.
     Volume(u32),
     /// It was left out.
@@ -129,9 +131,9 @@ impl Elements {
         Placed::Volume(self.volumes.push(&nodes[..corners.min(nodes.len())]))
     }
 
-    /// Where the file has volumes and no faces, their skin becomes the faces. The faces of each volume, by its number;
-    /// `None` where there is no skin.
-    pub(super) fn skin(&mut self, points: &[DVec3]) -> Option<Vec<std::ops::Range<usize>>> {
+    /// Where the file has volumes and no faces, their skin becomes the faces. The faces of each volume, by its number, with
+    /// a bit for each side that is one; `None` where there is no skin.
+    pub(super) fn skin(&mut self, points: &[DVec3]) -> Option<Vec<Own>> {
         if !self.faces.is_empty() {
             return None;
         }
@@ -150,7 +152,9 @@ impl Elements {
         let Some(ranges) = self.skin(points) else { return };
         for element in placed {
             if let Placed::Volume(volume) = element {
-                *element = ranges.get(*volume as usize).map_or(Placed::Nothing, |range| Placed::Faces(range.clone()));
+                *element = ranges
+                    .get(*volume as usize)
+                    .map_or(Placed::Nothing, |(range, sides)| Placed::Skin(range.clone(), *sides));
             }
         }
     }

@@ -1,5 +1,6 @@
 //! Decks that include other files: each directive is replaced by the file's lines between two comments, which tell the
 //! places of errors. The caller opens the files; formats open none.
+//! There are at most [`MOST_INCLUDES`] of them.
 //!
 //! Abaqus and CalculiX write `*INCLUDE, INPUT=file`, Nastran `INCLUDE 'file'`, where a quoted name may go on in the next
 //! lines. A file may include others, at most [`DEEPEST`] deep; one that includes itself is refused.
@@ -13,6 +14,9 @@ use super::error::{FormatError, Place, Reason};
 
 /// So deep files may include each other.
 pub const DEEPEST: usize = 16;
+/// So many includes a deck may have, each counted as often as it is made: files that include others many times could keep
+/// a reader busy for ever without ever being large.
+pub const MOST_INCLUDES: usize = 10_000;
 /// A quoted name of a Nastran deck goes over this many lines at most.
 const MOST_LINES: usize = 8;
 
@@ -39,7 +43,7 @@ pub fn expand(format: Format, bytes: &[u8], open: &mut Open<'_>) -> Result<Optio
     if !format.has_includes() || next(format, bytes, 0).is_none() {
         return Ok(None);
     }
-    let mut expansion = Expansion { format, open, out: Vec::with_capacity(2 * bytes.len()), stack: Vec::new() };
+    let mut expansion = Expansion { format, open, out: Vec::with_capacity(2 * bytes.len()), stack: Vec::new(), count: 0 };
     expansion.add(bytes).map_err(|error| error.in_format(format))?;
     Ok(Some(expansion.out))
 }
@@ -147,16 +151,20 @@ struct Expansion<'a, 'b> {
     out: Vec<u8>,
     /// The files that are being read, from the outermost on, with their names.
     stack: Vec<(PathBuf, String)>,
+    count: usize,
 }
 
 impl Expansion<'_, '_> {
     fn add(&mut self, bytes: &[u8]) -> Result<(), FormatError> {
-        let mut from = 0;
+        let (mut from, mut line) = (0, 1);
+        let lines = |part: &[u8]| part.iter().map(|&b| u64::from(b == b'\n')).sum::<u64>();
         while let Some(directive) = next(self.format, bytes, from) {
-            self.out.extend_from_slice(&bytes[from..directive.begin]);
+            let before = &bytes[from..directive.begin];
+            line += lines(before);
+            self.out.extend_from_slice(before);
             from = directive.end;
-            let line = 1 + bytes[..directive.begin].iter().map(|&b| u64::from(b == b'\n')).sum::<u64>();
             self.include(&directive).map_err(|why| self.error(line, &directive.name, why))?;
+            line += lines(&bytes[directive.begin..directive.end]);
         }
         self.out.extend_from_slice(&bytes[from..]);
         Ok(())
@@ -168,6 +176,10 @@ impl Expansion<'_, '_> {
         }
         if self.stack.len() == DEEPEST {
             return Err(Why::Here(format!("files are included more than {DEEPEST} deep")));
+        }
+        self.count += 1;
+        if self.count > MOST_INCLUDES {
+            return Err(Why::Here(format!("the deck has more than {MOST_INCLUDES} includes")));
         }
         let (file, bytes) = (self.open)(&directive.name).map_err(Why::Here)?;
         if self.stack.iter().any(|(known, _)| *known == file) {
@@ -260,6 +272,18 @@ mod tests {
         for deck in ["$ INCLUDE 'x'\n", "INCLUDED\n", "TITLE = INCLUDE x\n", "ENDDATA\nINCLUDE 'x'\n"] {
             assert_eq!(expanded(Format::Bdf, deck, &files).unwrap(), deck);
         }
+    }
+
+    #[test]
+    fn files_that_include_others_without_end_are_refused() {
+        let names: Vec<String> = (0..20).map(|i| format!("f{i}")).collect();
+        let many: Vec<String> = (0..20).map(|i| format!("*INCLUDE, INPUT=f{}\n", i + 1).repeat(300)).collect();
+        let files: Vec<(&str, &str)> = names.iter().map(String::as_str).zip(many.iter().map(String::as_str)).collect();
+        let deep = expanded(Format::Inp, "*INCLUDE, INPUT=f0\n", &files).unwrap_err();
+        assert!(deep.ends_with("files are included more than 16 deep"), "{deep}");
+        let wide = [files[0], files[1], ("f2", "")];
+        let wide = expanded(Format::Inp, "*INCLUDE, INPUT=f0\n", &wide).unwrap_err();
+        assert!(wide.ends_with("the deck has more than 10000 includes"), "{wide}");
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! The skin of a volume mesh: the faces that one volume alone has.
 //!
 //! Corners of tetrahedra, pyramids, wedges and bricks come in the order that Abaqus, Nastran, Gmsh and VTK share: the bottom,
-//! then the top above it. A side counts as inner when another volume has the same corners. Faces of the skin keep the
+//! then the top above it. Sides are numbered as in Abaqus. A side counts as inner when another volume has the same corners. Faces of the skin keep the
 //! order of the file, by element and side, and look outwards, away from the middle of their element.
 //!
 //! Linear in the number of volumes.
@@ -48,8 +48,11 @@ pub(super) struct Volumes {
     ends: Vec<usize>,
 }
 
+/// The faces of the skin that a volume has, and a bit for each of its sides that is one.
+pub(super) type Own = (Range<usize>, u8);
+
 /// The faces of a skin, and which of them each volume has.
-type Skin = (Vec<Facet>, Vec<Range<usize>>);
+type Skin = (Vec<Facet>, Vec<Own>);
 
 impl Volumes {
     /// Adds a volume and gives its number.
@@ -75,14 +78,16 @@ impl Volumes {
             let first = faces.len();
             let at = |&corner: &u32| points[corner as usize];
             let middle = corners.iter().map(at).sum::<DVec3>() / corners.len() as f64;
-            for side in sides(corners.len()) {
+            let mut own = 0;
+            for (number, side) in sides(corners.len()).iter().enumerate() {
                 // A brick whose corners fall together has sides that are edges.
                 let key = key(corners, side);
                 if users.get(&key) == Some(&1) && key[2] != u32::MAX {
+                    own |= 1 << number;
                     faces.push(outward(side.iter().map(|&i| corners[i]).collect(), middle, points));
                 }
             }
-            ranges.push(first..faces.len());
+            ranges.push((first..faces.len(), own));
         }
         (!faces.is_empty()).then_some((faces, ranges))
     }

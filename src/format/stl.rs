@@ -34,7 +34,7 @@ const FACET: usize = 50;
 const STRIDE: usize = 1 << 16;
 
 fn sniff(bytes: &[u8]) -> bool {
-    binary_size_fits(bytes) || looks_like_text(bytes)
+    binary_size_fits(bytes) || (looks_like_text(bytes) && begins_with_solid(bytes))
 }
 
 fn read(bytes: &[u8], watch: &Watch) -> ReadResult {
@@ -51,12 +51,15 @@ pub(super) fn binary_size_fits(bytes: &[u8]) -> bool {
     announced_facets(bytes).is_some_and(|n| n > 0 && bytes.len() as u64 == 84 + FACET as u64 * u64::from(n))
 }
 
+fn begins_with_solid(bytes: &[u8]) -> bool {
+    let start = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes).trim_ascii_start();
+    start.get(..5).is_some_and(|word| word.eq_ignore_ascii_case(b"solid"))
+}
+
 fn looks_like_text(bytes: &[u8]) -> bool {
     let start = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes).trim_ascii_start();
-    let word = |word: &[u8]| start.get(..word.len()).is_some_and(|w| w.eq_ignore_ascii_case(word));
     // A comment may stand before it, in a line of its own; then the error tells of that.
-    let later = |line: &[u8]| line.get(..5).is_some_and(|w| w.eq_ignore_ascii_case(b"solid"));
-    let solid = word(b"solid") || start[..start.len().min(4096)].split(|&b| b == b'\n').any(later);
+    let solid = start[..start.len().min(4096)].split(|&b| b == b'\n').any(begins_with_solid);
     // The name may be in any encoding, but no text has control bytes.
     solid && start.iter().take(512).all(|&b| b >= b' ' || b.is_ascii_whitespace() || b == 0x0b)
 }

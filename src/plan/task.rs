@@ -14,7 +14,7 @@ pub type TaskId = petgraph::graph::NodeIndex<u32>;
 /// What a task does. Equal tasks with equal inputs are one node of the plan, however many cases want them.
 #[derive(Clone, Debug)]
 pub enum Task {
-    /// Reads a file; its content hash is that of the bytes.
+    /// Reads a file; its content hash is that of the bytes, with those of the files that it includes in place.
     Source(SourceTask),
     /// Runs a step for one of its outputs.
     Step(StepTask),

@@ -4,6 +4,7 @@
 //! input. A file is included by its name relative to the deck's folder, and only from below it: no path and no link leads
 //! out. All included files together have at most [`MOST_BYTES`].
 
+use std::collections::BTreeSet;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -44,7 +45,7 @@ pub fn read(path: &Path) -> Result<Source, SourceError> {
     let bytes = std::fs::read(path)?;
     let mut folder = Folder::of(path);
     let expanded = folder.expand(path, &bytes)?;
-    Ok(Source { bytes: expanded.unwrap_or(bytes), included: folder.included })
+    Ok(Source { bytes: expanded.unwrap_or(bytes), included: folder.included.into_iter().collect() })
 }
 
 /// All files that a plan reads, included ones as well, as far as they are there.
@@ -59,7 +60,7 @@ pub fn files(plan: &Plan) -> Vec<PathBuf> {
                 let mut folder = Folder::of(&source.path);
                 // What cannot be read is in the list too: it may be there later.
                 let _ = folder.expand(&source.path, &bytes);
-                files.append(&mut folder.included);
+                files.extend(folder.included);
             }
         }
     }
@@ -110,7 +111,7 @@ fn may_include(path: &Path) -> bool {
 /// The folder of a deck, from which files are included.
 struct Folder {
     path: PathBuf,
-    included: Vec<PathBuf>,
+    included: BTreeSet<PathBuf>,
     /// How many bytes may still be included.
     left: u64,
 }
@@ -118,7 +119,7 @@ struct Folder {
 impl Folder {
     fn of(deck: &Path) -> Self {
         let folder = deck.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        Self { path: folder.to_path_buf(), included: Vec::new(), left: MOST_BYTES }
+        Self { path: folder.to_path_buf(), included: BTreeSet::new(), left: MOST_BYTES }
     }
 
     fn expand(&mut self, deck: &Path, bytes: &[u8]) -> Result<Option<Vec<u8>>, FormatError> {
@@ -129,9 +130,7 @@ impl Folder {
     fn open(&mut self, name: &str) -> Result<Opened, String> {
         // Decks from Windows.
         let path = self.path.join(name.replace('\\', "/"));
-        if !self.included.contains(&path) {
-            self.included.push(path.clone());
-        }
+        self.included.insert(path.clone());
         let system = |error: io::Error| match error.kind() {
             io::ErrorKind::NotFound => format!("there is no such file in {}", self.path.display()),
             _ => error.to_string(),

@@ -90,4 +90,7 @@ fn volumes_of_gmsh_are_their_skin_in_their_groups() {
         $Nodes\n4\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n$EndNodes\n$Elements\n1\n1 4 2 9 1 1 2 3 4\n$EndElements\n";
     let soup = mesh(text).unwrap();
     assert_eq!((soup.faces.len(), groups(&soup)), (4, vec!["faces body 4".to_owned()]));
+    let data = "$ElementData\n1\n\"heat\"\n1\n0\n3\n0\n1\n1\n1 2.5\n$EndElementData\n";
+    let soup = mesh(&format!("{text}{data}")).unwrap();
+    assert_eq!(soup.carried.fields[0].values, [2.5; 4]);
 }

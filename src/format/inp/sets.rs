@@ -117,17 +117,22 @@ struct Set {
     name: String,
     members: Vec<u32>,
     edges: Vec<EdgeKey>,
+    /// Single sides of volumes.
+    faces: Vec<FaceId>,
 }
 
 /// What a card's rows mean.
 struct Found {
     members: Vec<u32>,
     edges: Vec<EdgeKey>,
+    faces: Vec<FaceId>,
+    /// Sides of volumes that lie inside.
+    inside: usize,
 }
 
 impl Found {
     fn len(&self) -> usize {
-        self.members.len() + self.edges.len()
+        self.members.len() + self.edges.len() + self.faces.len()
     }
 }
 
@@ -189,7 +194,7 @@ impl<'a> Sets<'a> {
             return Ok(());
         }
         let mut missing = 0;
-        let mut found = Found { members: card.members.clone(), edges: Vec::new() };
+        let mut found = Found { members: card.members.clone(), edges: Vec::new(), faces: Vec::new(), inside: 0 };
         let mut left = self.budget;
         for (row, place) in card.rows.iter() {
             let before = found.len();
@@ -204,6 +209,9 @@ impl<'a> Sets<'a> {
         if missing > 0 {
             counts.note_with(|| format!("{missing} members of {}, which the file does not have", what()));
         }
+        if found.inside > 0 {
+            counts.note_with(|| format!("{} sides of {}, which lie inside", found.inside, what()));
+        }
         self.budget = left;
         let key = (card.kind, card.owner, card.name.to_ascii_uppercase());
         let set = self.known.entry(key).or_default();
@@ -214,6 +222,7 @@ impl<'a> Sets<'a> {
         set.members.sort_unstable();
         set.members.dedup();
         set.edges.extend(found.edges);
+        set.faces.extend(found.faces);
         Ok(())
     }
 
@@ -249,7 +258,9 @@ impl<'a> Sets<'a> {
                     found.members.extend(named.iter());
                 } else if let Some(number) = numbered('E') {
                     found.edges.extend(self.sides(&named, number));
-                } else if side.is_empty() || side == "SPOS" || side == "SNEG" || numbered('S').is_some() {
+                } else if let Some(number) = numbered('S') {
+                    self.volume_sides(&named, number, found);
+                } else if side.is_empty() || side == "SPOS" || side == "SNEG" {
                     found.members.extend(named.iter());
                 } else {
                     return Err(format!("side `{side}`"));
@@ -317,11 +328,29 @@ impl<'a> Sets<'a> {
         found.map(Cow::Borrowed).ok_or_else(|| format!("no set `{name}` could be read from the file"))
     }
 
+    /// Side `number`, counted from 1, of each volume among the elements; other elements have one side, themselves.
+    fn volume_sides(&self, elements: &[u32], number: usize, found: &mut Found) {
+        for &element in elements {
+            match &self.placed[element as usize] {
+                Placed::Skin(range, sides) => {
+                    let bit = 1_u8.checked_shl(number.saturating_sub(1) as u32).unwrap_or(0);
+                    if number > 0 && sides & bit != 0 {
+                        let before = (sides & (bit - 1)).count_ones() as usize;
+                        found.faces.push(FaceId::new(range.start + before));
+                    } else {
+                        found.inside += 1;
+                    }
+                }
+                _ => found.members.push(element),
+            }
+        }
+    }
+
     /// Side `number`, counted from 1, of each face among the elements.
     fn sides(&self, elements: &[u32], number: usize) -> Vec<EdgeKey> {
         let faces = elements.iter().filter_map(|&e| match &self.placed[e as usize] {
             Placed::Faces(range) => self.faces.get(range.start),
-            Placed::Edge(_) | Placed::Vertex(_) | Placed::Volume(_) | Placed::Nothing => None,
+            Placed::Edge(_) | Placed::Vertex(_) | Placed::Skin(..) | Placed::Volume(_) | Placed::Nothing => None,
         });
         let side = |facet: &Facet| {
             let corners = facet.corners();
@@ -356,7 +385,7 @@ impl<'a> Sets<'a> {
             }
             if let Some(other) = taken.get(&(on_nodes, name.to_ascii_uppercase())) {
                 // A surface made of the whole set of its name is the same group.
-                if *other == set.members && set.edges.is_empty() {
+                if *other == set.members && set.edges.is_empty() && set.faces.is_empty() {
                     continue;
                 }
                 name = format!("{name}_surface");
@@ -366,14 +395,16 @@ impl<'a> Sets<'a> {
                 groups.vertices.insert(name, set.members.into_iter().map(VertexId::from_raw).collect());
                 continue;
             }
-            let (mut faces, mut edges) = (Vec::new(), set.edges);
+            let (mut faces, mut edges) = (set.faces, set.edges);
             for placed in set.members.iter().map(|&e| &self.placed[e as usize]) {
                 match placed {
-                    Placed::Faces(range) => faces.extend(range.clone().map(FaceId::new)),
+                    Placed::Faces(range) | Placed::Skin(range, _) => faces.extend(range.clone().map(FaceId::new)),
                     Placed::Edge(edge) => edges.push(*edge),
                     Placed::Vertex(_) | Placed::Volume(_) | Placed::Nothing => {}
                 }
             }
+            faces.sort_unstable();
+            faces.dedup();
             edges.sort_unstable();
             edges.dedup();
             if !edges.is_empty() {

@@ -32,7 +32,7 @@ struct Members {
 impl Members {
     fn add(&mut self, placed: &Placed) {
         match placed {
-            Placed::Faces(range) => self.faces.extend(range.clone().map(FaceId::new)),
+            Placed::Faces(range) | Placed::Skin(range, _) => self.faces.extend(range.clone().map(FaceId::new)),
             Placed::Edge(edge) => self.edges.push(*edge),
             Placed::Vertex(vertex) => self.vertices.push(*vertex),
             Placed::Volume(volume) => self.volumes.push(*volume),
@@ -67,6 +67,8 @@ pub(super) struct Model<'w> {
     entities: BTreeMap<(i64, i64), Members>,
     /// Faces with their element numbers.
     face_tags: Vec<(i64, u32)>,
+    /// The numbers of volumes.
+    volume_tags: Vec<i64>,
     data: Vec<Data>,
     count: usize,
     memberships: usize,
@@ -252,8 +254,10 @@ impl Model<'_> {
             Shape::Volume => self.elements.volume(nodes, volume_corners(kind)),
             _ => self.elements.add(shape, nodes, &self.points),
         };
-        if let Placed::Faces(range) = &placed {
-            self.face_tags.push((tag, range.start as u32));
+        match &placed {
+            Placed::Faces(range) => self.face_tags.push((tag, range.start as u32)),
+            Placed::Volume(_) => self.volume_tags.push(tag),
+            Placed::Edge(_) | Placed::Vertex(_) | Placed::Skin(..) | Placed::Nothing => {}
         }
         if let Some(entity) = entity {
             self.entities.entry((i64::from(dimension), entity)).or_default().add(&placed);
@@ -317,9 +321,12 @@ impl Model<'_> {
 
     fn finish(mut self) -> Result<(Soup, ReadCounts), FormatError> {
         if let Some(ranges) = self.elements.skin(&self.points) {
+            for (tag, (range, _)) in self.volume_tags.iter().zip(&ranges) {
+                self.face_tags.extend(range.clone().map(|face| (*tag, face as u32)));
+            }
             for members in self.groups.values_mut().chain(self.entities.values_mut()) {
                 let faces = members.volumes.iter().filter_map(|&volume| ranges.get(volume as usize));
-                members.faces.extend(faces.flat_map(|range| range.clone().map(FaceId::new)));
+                members.faces.extend(faces.flat_map(|(range, _)| range.clone().map(FaceId::new)));
             }
         }
         let mut soup = Soup { points: std::mem::take(&mut self.points).into(), ..Soup::default() };
@@ -336,18 +343,25 @@ impl Model<'_> {
     /// Elements without a row have NaN, which no file can hold: the value is not known.
     fn field(&self, data: Data, points: usize, faces: usize) -> Field {
         let Data { name, support, components, rows } = data;
-        let tags: FxHashMap<i64, u32> = match support {
-            Support::Vertex => FxHashMap::default(),
-            Support::Face => self.face_tags.iter().copied().collect(),
-        };
-        let (known, len) = match support {
-            Support::Vertex => (&self.nodes, points),
-            Support::Face => (&tags, faces),
-        };
+        let len = if support == Support::Vertex { points } else { faces };
         let mut values = vec![f64::NAN; len * components];
-        for (tag, row) in rows {
-            if let Some(&at) = known.get(&tag) {
-                values[at as usize * components..][..components].copy_from_slice(&row);
+        let mut put = |at: u32, row: &[f64]| values[at as usize * components..][..components].copy_from_slice(row);
+        match support {
+            Support::Vertex => {
+                for (tag, row) in &rows {
+                    if let Some(&at) = self.nodes.get(tag) {
+                        put(at, row);
+                    }
+                }
+            }
+            // A volume may have several faces.
+            Support::Face => {
+                let rows: FxHashMap<i64, &[f64]> = rows.iter().map(|(tag, row)| (*tag, row.as_slice())).collect();
+                for (tag, at) in &self.face_tags {
+                    if let Some(row) = rows.get(tag) {
+                        put(*at, row);
+                    }
+                }
             }
         }
         Field { name, support, components, values }

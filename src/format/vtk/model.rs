@@ -256,7 +256,7 @@ impl DataSet {
             let mut put = |shape: Shape, nodes: &[u32]| match elements.add(shape, nodes, points) {
                 Placed::Faces(range) => origins.faces.extend(range.map(|_| i as u32)),
                 Placed::Edge(edge) => origins.edges.push((edge, i as u32)),
-                Placed::Vertex(_) | Placed::Volume(_) | Placed::Nothing => {}
+                Placed::Vertex(_) | Placed::Skin(..) | Placed::Volume(_) | Placed::Nothing => {}
             };
             match kind {
                 cell::VERTEX | cell::POLY_VERTEX => nodes.iter().for_each(|&n| put(Shape::Point, &[n])),
@@ -274,7 +274,7 @@ impl DataSet {
         }
         if let Some(ranges) = elements.skin(points) {
             origins.faces =
-                origins.volumes.iter().zip(ranges).flat_map(|(&cell, faces)| faces.map(move |_| cell)).collect();
+                origins.volumes.iter().zip(ranges).flat_map(|(&cell, (faces, _))| faces.map(move |_| cell)).collect();
         }
         Ok(origins)
     }
