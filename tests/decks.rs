@@ -343,7 +343,9 @@ fn sides_of_volumes_are_their_faces_on_the_skin() {
         ("C3D5", "5,6,7,8,13", 3, &[6, 7, 13]),
         ("C3D8", "1,2,3,4,5,6,7,8", 6, &[1, 4, 5, 8]),
     ] {
-        let deck = format!("{BRICKS}*ELEMENT, TYPE={kind}\n1, {nodes}\n*SURFACE, NAME=s\n1, S{side}\n*NSET, NSET=n\n1,2,3,4,5,6,7,8,9,10,11,12,13\n");
+        let deck = format!(
+            "{BRICKS}*ELEMENT, TYPE={kind}\n1, {nodes}\n*SURFACE, NAME=s\n1, S{side}\n*NSET, NSET=n\n1,2,3,4,5,6,7,8,9,10,11,12,13\n"
+        );
         let (soup, _) = read(Format::Inp, deck.as_bytes(), &Watch::silent()).expect(kind);
         let corners = soup.faces[soup.carried.groups.faces["s"][0]].corners();
         let mut at: Vec<String> = corners.iter().map(|&v| soup.points[v].to_string()).collect();

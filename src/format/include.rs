@@ -43,7 +43,8 @@ pub fn expand(format: Format, bytes: &[u8], open: &mut Open<'_>) -> Result<Optio
     if !format.has_includes() || next(format, bytes, 0).is_none() {
         return Ok(None);
     }
-    let mut expansion = Expansion { format, open, out: Vec::with_capacity(2 * bytes.len()), stack: Vec::new(), count: 0 };
+    let mut expansion =
+        Expansion { format, open, out: Vec::with_capacity(2 * bytes.len()), stack: Vec::new(), count: 0 };
     expansion.add(bytes).map_err(|error| error.in_format(format))?;
     Ok(Some(expansion.out))
 }

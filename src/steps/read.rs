@@ -199,7 +199,7 @@ pub struct Step;
 
 impl StepContract for Step {
     const NAME: &'static str = "read";
-    const REVISION: u32 = 3;
+    const REVISION: u32 = 4;
     const INPUTS: &'static [InputDef] =
         &[InputDef { name: "file", accepts: &[Port::File], required: true, doc: "the mesh file" }];
     const OUTPUTS: &'static [OutputDef] = &[OutputDef { name: "main", port: OutPort::Is(Port::Soup), derive: None }];

@@ -173,7 +173,9 @@ impl Deck {
         gathered.skin_of(&points, &mut placed);
         for (element, placed) in self.elements.iter().zip(placed) {
             match placed {
-                Placed::Faces(range) | Placed::Skin(range, _) => faces.entry(element.property).or_default().extend(range.map(FaceId::new)),
+                Placed::Faces(range) | Placed::Skin(range, _) => {
+                    faces.entry(element.property).or_default().extend(range.map(FaceId::new));
+                }
                 Placed::Edge(edge) if edge[0] != edge[1] => edges.entry(element.property).or_default().push(edge),
                 Placed::Edge(_) | Placed::Vertex(_) | Placed::Volume(_) | Placed::Nothing => {}
             }
