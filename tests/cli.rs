@@ -245,6 +245,8 @@ fn a_file_where_the_outputs_are_to_go_is_told_before_anything_runs() {
     let desk = Desk::new();
     let refused = desk.meshmill(&["run", "recipe.toml", "--out", "cube.obj"]).assert().failure();
     refused.stderr(predicate::str::contains("this is a file").and(predicate::str::contains("name a folder")));
+    let below = desk.meshmill(&["run", "recipe.toml", "--out", "cube.obj/deep/er"]).assert().code(2);
+    below.stderr(predicate::str::contains("cube.obj is a file"));
 }
 
 #[test]

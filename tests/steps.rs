@@ -1,4 +1,5 @@
-//! Every step on generated shapes: golden statistics and metrics, the invariants of its head comment, its example.
+//! Every step on generated shapes: golden statistics and metrics, the invariants of its head comment, its example;
+//! random damage to what steps give, and whole recipes on random meshes.
 
 #![expect(clippy::print_stderr, reason = "a skipped test says so")]
 
@@ -21,6 +22,7 @@ mod steps {
     mod example;
     mod features;
     mod fit_patches;
+    mod fuzz;
     mod golden;
     mod improve_quality;
     mod measure;

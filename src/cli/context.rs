@@ -55,6 +55,18 @@ impl RecipeArguments {
         )))
     }
 
+    /// All of them as they decide which run is meant.
+    pub(super) fn identity(&self) -> Vec<Vec<u8>> {
+        let Self { recipe, set, input } = self;
+        let mut parts = vec![recipe.as_os_str().as_encoded_bytes().to_vec()];
+        for (option, pairs) in [("--set", set), ("--input", input)] {
+            for (name, value) in pairs {
+                parts.extend([option, name, value].map(|text| text.as_bytes().to_vec()));
+            }
+        }
+        parts
+    }
+
     /// The file of the recipe.
     pub(super) fn path(&self) -> &Path {
         &self.recipe

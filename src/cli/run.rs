@@ -109,7 +109,8 @@ impl Arguments {
     fn unchanged(&self, global: &Global) -> Option<Unchanged> {
         let plain =
             self.force.is_empty() && !self.json && !self.report && self.trace.is_none() && self.locked.is_none();
-        let more = (&self.out, &self.only, self.pictures);
+        let mut more = vec![("--out", path_bytes(self.out.as_deref())), ("--pictures", vec![self.pictures as u8])];
+        more.extend(self.only.iter().map(|step| ("--only", step.as_bytes().to_vec())));
         (plain && global.verbose == 0).then(|| Unchanged::of("run", &self.recipe, &more, global))
     }
 }
@@ -209,12 +210,23 @@ pub(super) fn options(
     Ok(RunOptions { protected, cancelled, ..RunOptions::new(&name, out, jobs) })
 }
 
-/// The folder of the outputs; nothing may be there, or a folder.
+/// The folder of the outputs; nothing may be there, or a folder, and no file in the place of one above it.
 pub(super) fn folder(out: PathBuf) -> Result<PathBuf, Fault> {
-    if out.exists() && !out.is_dir() {
-        return Err(Fault::usage(format!("--out {}: this is a file", out.display())).help("name a folder"));
+    // What lies below a file does not exist, so that the nearest that does tells.
+    let there = out.ancestors().find(|path| path.symlink_metadata().is_ok());
+    match there.filter(|path| path.exists() && !path.is_dir()) {
+        Some(file) if file == out => {
+            Err(Fault::usage(format!("--out {}: this is a file", out.display())).help("name a folder"))
+        }
+        Some(file) => Err(Fault::usage(format!("--out {}: {} is a file", out.display(), file.display()))
+            .help("name a folder that is not below a file")),
+        None => Ok(out),
     }
-    Ok(out)
+}
+
+/// A path as it was given, or nothing.
+pub(super) fn path_bytes(path: Option<&Path>) -> Vec<u8> {
+    path.map(|path| path.as_os_str().as_encoded_bytes().to_vec()).unwrap_or_default()
 }
 
 /// How many tasks run at once.

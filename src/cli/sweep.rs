@@ -7,7 +7,7 @@ use super::Global;
 use super::context::{Planned, RecipeArguments, list_files, open_store, pair, plan_cases, protected};
 use super::exit::{Exit, Fault, data, document_text, say};
 use super::picture::{self, Pictures};
-use super::run::{folder, jobs_of, left_out, traced, write_record};
+use super::run::{folder, jobs_of, left_out, path_bytes, traced, write_record};
 use super::signals::Interrupt;
 use super::unchanged::Unchanged;
 use super::{goal, progress, report};
@@ -129,7 +129,14 @@ impl Arguments {
     /// The short cut for this sweep; none where more is asked for than that everything is up to date.
     fn unchanged(&self, global: &Global) -> Option<Unchanged> {
         let plain = self.goal.is_none() && !self.report && !self.list && self.trace.is_none() && global.verbose == 0;
-        let more = (&self.axes, &self.out, self.json, self.csv, self.pictures);
+        let mut more = vec![
+            ("--out", path_bytes(self.out.as_deref())),
+            ("--pictures", vec![self.pictures as u8]),
+            ("--json --csv", vec![u8::from(self.json), u8::from(self.csv)]),
+        ];
+        more.extend(
+            self.axes.iter().flat_map(|(name, values)| [("-s", name.clone().into()), ("", values.clone().into())]),
+        );
         plain.then(|| Unchanged::of("sweep", &self.recipe, &more, global))
     }
 }

@@ -16,11 +16,17 @@ pub(super) struct Unchanged {
 }
 
 impl Unchanged {
-    /// `more` are arguments besides the recipe's that decide what the run does or says.
-    pub(super) fn of(what: &str, recipe: &RecipeArguments, more: &dyn std::fmt::Debug, global: &Global) -> Self {
+    /// `more` are arguments besides the recipe's that decide what the run does or says, each with its name.
+    pub(super) fn of(what: &str, recipe: &RecipeArguments, more: &[(&str, Vec<u8>)], global: &Global) -> Self {
         let here = std::env::current_dir().unwrap_or_default();
-        let arguments = format!("{what} {recipe:?} {more:?} {}", global.quiet);
-        Self { identity: identity(&[&program(), here.as_os_str().as_encoded_bytes(), arguments.as_bytes()]) }
+        let (program, own) = (program(), recipe.identity());
+        let mut parts = vec![program.as_slice(), here.as_os_str().as_encoded_bytes(), what.as_bytes()];
+        parts.extend(own.iter().map(Vec::as_slice));
+        for (name, value) in more {
+            parts.extend([name.as_bytes(), value]);
+        }
+        parts.push(if global.quiet { b"quiet" } else { b"" });
+        Self { identity: identity(&parts) }
     }
 
     /// Says what that run said, and tells its exit code; `None` when anything has changed.
