@@ -2,19 +2,20 @@
 //!
 //! Layout after Wavefront Technologies, "Advanced Visualizer Manual", appendix B1, 1993. Read are `v` (weights and
 //! colours after the coordinates are ignored), `f` (texture and normal numbers are ignored), `l`, `p`, `g`, `o` and
-//! `usemtl`; everything else is skipped. The file is walked twice, first for the vertices, so that faces may point at
+//! `usemtl`; textures, normals and the like are skipped, `call` is refused, since it takes data from elsewhere, and all
+//! other statements, such as those of free-form surfaces, are skipped and named. The file is walked twice, first for the vertices, so that faces may point at
 //! later vertices; relative numbers count back from the vertices above them.
 //!
 //! Each name of `g`, `o` and `usemtl` becomes a face group, lines an edge group and points a vertex group of the
 //! current names, `lines` and `points` without one. Lost on writing: fields, regions as labels (they become groups),
 //! blanks in group names (written as `_`), and the difference between groups, objects and materials. O(file) time.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use glam::DVec3;
 
 use super::builder::{Builder, MOST_GROUPS};
-use super::error::{FormatError, Place, Reason};
+use super::error::{FormatError, Place, Reason, excerpt};
 use super::sets::face_sets;
 use super::text::{Scanner, parse_integer, parse_number, push_integer, push_name, push_number};
 use super::{FormatDef, ReadResult, WriteOptions};
@@ -32,6 +33,15 @@ pub(super) const DEF: FormatDef = FormatDef {
 
 /// Lines between two looks at the watch.
 const STRIDE: u64 = 1 << 16;
+
+/// Statements about textures, normals, materials and how it is shown.
+const HARMLESS: [&[u8]; 17] = [
+    b"vt", b"vn", b"vp", b"s", b"mg", b"mtllib", b"maplib", b"usemap", b"bevel", b"c_interp", b"d_interp", b"lod",
+    b"shadow_obj", b"trace_obj", b"ctech", b"stech", b"end",
+];
+
+/// Names of other statements that are kept.
+const MOST_UNREAD: usize = 1000;
 
 /// OBJ has no signature: the first statement must be one of the usual ones.
 fn sniff(bytes: &[u8]) -> bool {
@@ -53,7 +63,7 @@ fn scanner(bytes: &[u8]) -> Scanner<'_> {
 fn read(bytes: &[u8], watch: &Watch) -> ReadResult {
     let mut builder = Builder::new(bytes.len() / 60, bytes.len() / 40);
     read_vertices(bytes, &mut builder, watch)?;
-    let mut statements = Statements { builder, above: 0, names: Names::default(), corners: Vec::new() };
+    let mut statements = Statements { builder, above: 0, names: Names::default(), corners: Vec::new(), unread: BTreeMap::new() };
     statements.read(scanner(bytes), watch, bytes.len())?;
     statements.builder.finish()
 }
@@ -125,6 +135,8 @@ struct Statements {
     above: usize,
     names: Names,
     corners: Vec<VertexId>,
+    /// Statements that are neither read nor harmless, and how many of each.
+    unread: BTreeMap<Vec<u8>, usize>,
 }
 
 impl Statements {
@@ -141,6 +153,10 @@ impl Statements {
             }
         }
         self.close_names();
+        for (keyword, count) in &self.unread {
+            let keyword = excerpt(keyword);
+            self.builder.counts.note_with(|| format!("{count} statements `{keyword}`"));
+        }
         Ok(())
     }
 
@@ -172,9 +188,26 @@ impl Statements {
                 self.close_names();
                 self.names.material = rest_name(scanner);
             }
-            _ => {}
+            b"call" | b"csh" => {
+                let what = format!("`{}`, which takes data from elsewhere,", String::from_utf8_lossy(keyword));
+                return Err(FormatError::new(scanner.place(), Reason::Unsupported(what))
+                    .with_remedy("put the lines of that file in its place"));
+            }
+            _ => self.left_out(keyword),
         }
         Ok(())
+    }
+
+    /// Counts a statement that is not read, unless it says nothing about the mesh.
+    fn left_out(&mut self, keyword: &[u8]) {
+        if HARMLESS.contains(&keyword) {
+            return;
+        }
+        if let Some(count) = self.unread.get_mut(keyword) {
+            *count += 1;
+        } else if self.unread.len() < MOST_UNREAD {
+            self.unread.insert(keyword.to_vec(), 1);
+        }
     }
 
     /// Reads the vertex numbers up to the end of the line.

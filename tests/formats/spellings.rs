@@ -77,3 +77,21 @@ fn text_of_16_bits_a_letter_is_named() {
         assert!(error.contains("UTF-16") && error.contains("save it as UTF-8"), "{error}");
     }
 }
+
+#[test]
+fn statements_and_sections_that_nobody_reads_are_named() {
+    let obj = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvn 0 0 1\ns 1\nf 1 2 3\n";
+    assert_eq!(outcome(Format::Obj, obj.as_bytes()), Ok((1, Vec::new())));
+    let free = format!("{obj}cstype bspline\ncurv 0 1 1 2\ncurv 0 1 2 3\nend\n");
+    let named = vec!["1 statements `cstype`".to_owned(), "2 statements `curv`".to_owned()];
+    assert_eq!(outcome(Format::Obj, free.as_bytes()), Ok((1, named)));
+    let call = outcome(Format::Obj, format!("{obj}call other.obj\n").as_bytes()).unwrap_err();
+    assert!(call.contains("line 9: `call`, which takes data from elsewhere, is not supported"), "{call}");
+    let msh = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n3\n1 0 0 0\n2 1 0 0\n3 0 1 0\n$EndNodes\n$Elements\n1\n\
+        1 2 2 0 1 1 2 3\n$EndElements\n$Comments\nx\n$EndComments\n$ElementNodeData\n1\n$EndElementNodeData\n";
+    assert_eq!(outcome(Format::Msh, msh.as_bytes()), Ok((1, vec!["section `$ElementNodeData`".to_owned()])));
+    let ply = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
+        element face 1\nproperty list uchar int vertex_indices\nelement range_grid 1\nproperty list uchar int vertex_indices\n\
+        end_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n1 0\n";
+    assert_eq!(outcome(Format::Ply, ply.as_bytes()), Ok((1, vec!["1 items of element `range_grid`".to_owned()])));
+}

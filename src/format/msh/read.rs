@@ -8,7 +8,7 @@ use rustc_hash::FxHashMap;
 use super::super::ReadCounts;
 use super::super::binary::ByteOrder;
 use super::super::element::{Elements, Placed, Shape};
-use super::super::error::{FormatError, Place, Reason};
+use super::super::error::{FormatError, Place, Reason, excerpt};
 use super::super::mixed::Input;
 use super::{element_type, is_quad, v2, v4, volume_corners};
 use crate::mesh::{EdgeKey, FaceId, Field, Soup, Support, VertexId};
@@ -19,6 +19,10 @@ const STRIDE: usize = 1 << 16;
 
 /// Groups of an element on average; a hostile file could put every element in many.
 const MOST_GROUPS: usize = 64;
+
+/// Sections that are not read and say nothing about the mesh.
+const HARMLESS: [&[u8]; 6] =
+    [b"Comments", b"GhostElements", b"Periodic", b"Parametrizations", b"InterpolationScheme", b"PostFormat"];
 
 /// The members of a physical group or an entity.
 #[derive(Debug, Default)]
@@ -102,6 +106,9 @@ pub(super) fn read(bytes: &[u8], watch: &Watch) -> Result<(Soup, ReadCounts), Fo
             _ => {
                 if !input.skip_behind(&[b"$End", name].concat()) {
                     return Err(FormatError::new(input.place(), Reason::Truncated { within: "a section" }));
+                }
+                if !HARMLESS.contains(&name) {
+                    model.elements.counts.note(&format!("section `${}`", excerpt(name)));
                 }
                 continue;
             }

@@ -16,6 +16,9 @@ use crate::watch::Watch;
 /// Items between two looks at the watch.
 const STRIDE: u64 = 1 << 16;
 
+/// Elements that are read, and those that say nothing about the mesh.
+const READ: [&str; 5] = ["vertex", "face", "tristrips", "edge", "material"];
+
 pub(super) fn read(bytes: &[u8], watch: &Watch) -> ReadResult {
     let mut scanner = Scanner::new(bytes);
     let head = read_head(&mut scanner)?;
@@ -221,6 +224,9 @@ impl<'a> Body<'a> {
             return Err(
                 FormatError::new(element.place, reason).with_remedy("the file is cut off or damaged: export it again")
             );
+        }
+        if !READ.contains(&element.name.as_str()) && element.count > 0 {
+            self.builder.counts.note(&format!("{} items of element `{}`", element.count, element.name));
         }
         let roles = self.roles(element, head);
         watch.phase(&format!("reading element {}", element.name), Some(element.count));
