@@ -65,6 +65,7 @@ fn systems_that_cannot_be_are_named() {
         ("CORD2R,9,9,0.,0.,0.,0.,0.,1.\n,1.,0.,0.\n", "defined in itself"),
         ("CORD2R,9,,0.,0.,0.,0.,0.,1.\n,0.,0.,7.\n", "lie on a line"),
         ("CORD1R,9,1,2,3\n", "defined in itself"),
+        ("CORD2R,9,,0.,1.7+308,0.,0.,1.7+308,1.\n,5.,1.7+308,0.\nGRID,9,9,0.,1.7+308,0.\n", "is not a finite number"),
         ("CORD3G,9,,0.,0.,0.\n", "CORD3G"),
         (&format!("{}{}", SHIFTED.replace(",5,", ",9,"), SHIFTED.replace(",5,", ",9,")), "coordinate system 9"),
     ] {
@@ -208,6 +209,7 @@ fn an_instance_is_moved_then_turned() {
         ("*INSTANCE, NAME=I, PART=Q\n", "expected a part defined above, found \"Q\""),
         ("*INSTANCE, NAME=I, PART=P\n1, 2, 3, 4\n", "line 12: expected the end of the line"),
         ("*INSTANCE, NAME=I, PART=P\n0,0,0\n1,1,1,1,1,1,30\n", "an axis between two points that differ"),
+        ("*INSTANCE, NAME=I, PART=P\n1.7e308\n-1.7e308,0,0,-1.7e308,0,1,45\n", "instance is not a finite number"),
         ("*INSTANCE, NAME=I, PART=P\n*NODE\n9, 1, 1, 1\n", "*NODE within an instance"),
         (
             "*INSTANCE, NAME=I, PART=P\n*END INSTANCE\n*INSTANCE, NAME=i, PART=P\n",
@@ -303,8 +305,11 @@ fn volumes_beside_faces_are_left_out() {
 fn solids_of_nastran_are_their_skin_too() {
     let grids = "GRID,1,,0.,0.,0.\nGRID,2,,1.,0.,0.\nGRID,3,,0.,1.,0.\nGRID,4,,0.,0.,1.\n";
     let deck = format!("BEGIN BULK\n{grids}CTETRA,1,7,1,2,3,4\nENDDATA\n");
-    let (soup, _) = read(Format::Bdf, deck.as_bytes(), &Watch::silent()).expect("a tetrahedron");
-    assert_eq!((soup.faces.len(), names(&soup)), (4, vec!["faces pid_7 4".to_owned()]));
+    let some = format!("BEGIN BULK\n{grids}GRID,5,,.5,0.,0.\nCTETRA,1,7,1,2,3,4,5\nENDDATA\n");
+    for deck in [deck, some] {
+        let (soup, _) = read(Format::Bdf, deck.as_bytes(), &Watch::silent()).expect("a tetrahedron");
+        assert_eq!((soup.points.len(), soup.faces.len(), names(&soup)), (4, 4, vec!["faces pid_7 4".to_owned()]));
+    }
 }
 
 #[test]

@@ -100,11 +100,18 @@ impl Volumes {
 
 /// What tells a side from others: its corners in order, each once.
 fn key(corners: &[u32], side: &[usize]) -> [u32; 4] {
-    let mut own: Vec<u32> = side.iter().map(|&i| corners[i]).collect();
+    let mut own = [u32::MAX; 4];
+    for (slot, &corner) in own.iter_mut().zip(side) {
+        *slot = corners[corner];
+    }
     own.sort_unstable();
-    own.dedup();
-    own.resize(4, u32::MAX);
-    [own[0], own[1], own[2], own[3]]
+    for i in (1..4).rev() {
+        if own[i] == own[i - 1] {
+            own[i] = u32::MAX;
+        }
+    }
+    own.sort_unstable();
+    own
 }
 
 /// The face of these corners that looks away from `middle`.

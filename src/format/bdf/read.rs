@@ -42,6 +42,7 @@ pub(super) fn read(bytes: &[u8], watch: &Watch) -> ReadResult {
 /// A shell, bar or solid that waits for the grid points, which may stand after it.
 struct Waiting {
     shape: Shape,
+    corners: usize,
     property: i64,
     /// Its part of `Deck::nodes`.
     end: usize,
@@ -139,7 +140,8 @@ impl Deck {
             }
         }
         let property = property.or(own).unwrap_or(0);
-        self.elements.push(Waiting { shape, property, end: self.nodes.len(), line: card.line });
+        let corners = *nodes.start();
+        self.elements.push(Waiting { shape, corners, property, end: self.nodes.len(), line: card.line });
         Ok(())
     }
 
@@ -168,7 +170,11 @@ impl Deck {
                 positions.push(self.position(node, element.line)?);
             }
             start = element.end;
-            placed.push(gathered.add(element.shape, &positions, &points));
+            placed.push(match element.shape {
+                // Any of its mid-side nodes may be missing.
+                Shape::Volume => gathered.volume(&positions, element.corners),
+                shape => gathered.add(shape, &positions, &points),
+            });
         }
         gathered.skin_of(&points, &mut placed);
         for (element, placed) in self.elements.iter().zip(placed) {

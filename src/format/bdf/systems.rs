@@ -140,7 +140,12 @@ impl Systems {
     ) -> Result<Vec<DVec3>, FormatError> {
         let mut points = Vec::with_capacity(grids.len());
         for given in grids {
-            points.push(self.point(*given, grids, grid, 0)?);
+            let point = self.point(*given, grids, grid, 0)?;
+            if !point.is_finite() {
+                let (what, found) = ("a coordinate in the basic system", point.to_string());
+                return Err(FormatError::new(Place::Line(given.line), Reason::NotFinite { what, found }));
+            }
+            points.push(point);
         }
         Ok(points)
     }

@@ -171,6 +171,10 @@ impl Reader<'_> {
             self.points.extend(pristine[nodes].iter().map(|&point| placement.place(point)));
             elements += own.len();
         }
+        if let Some(point) = self.points.iter().find(|point| !point.is_finite()) {
+            let (what, found) = ("a coordinate of a moved or turned instance", point.to_string());
+            return Err(FormatError::new(Place::File, Reason::NotFinite { what, found }));
+        }
         if self.points.len() + elements >= u32::MAX as usize {
             let limit = u64::from(u32::MAX) - 1;
             return Err(FormatError::new(Place::File, Reason::TooMany { what: "nodes or elements", limit }));
