@@ -36,8 +36,23 @@ const STRIDE: u64 = 1 << 16;
 
 /// Statements about textures, normals, materials and how it is shown.
 const HARMLESS: [&[u8]; 17] = [
-    b"vt", b"vn", b"vp", b"s", b"mg", b"mtllib", b"maplib", b"usemap", b"bevel", b"c_interp", b"d_interp", b"lod",
-    b"shadow_obj", b"trace_obj", b"ctech", b"stech", b"end",
+    b"vt",
+    b"vn",
+    b"vp",
+    b"s",
+    b"mg",
+    b"mtllib",
+    b"maplib",
+    b"usemap",
+    b"bevel",
+    b"c_interp",
+    b"d_interp",
+    b"lod",
+    b"shadow_obj",
+    b"trace_obj",
+    b"ctech",
+    b"stech",
+    b"end",
 ];
 
 /// Names of other statements that are kept.
@@ -63,7 +78,8 @@ fn scanner(bytes: &[u8]) -> Scanner<'_> {
 fn read(bytes: &[u8], watch: &Watch) -> ReadResult {
     let mut builder = Builder::new(bytes.len() / 60, bytes.len() / 40);
     read_vertices(bytes, &mut builder, watch)?;
-    let mut statements = Statements { builder, above: 0, names: Names::default(), corners: Vec::new(), unread: BTreeMap::new() };
+    let mut statements =
+        Statements { builder, above: 0, names: Names::default(), corners: Vec::new(), unread: BTreeMap::new() };
     statements.read(scanner(bytes), watch, bytes.len())?;
     statements.builder.finish()
 }
