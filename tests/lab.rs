@@ -161,6 +161,43 @@ fn init_writes_a_recipe_that_is_right() {
 }
 
 #[test]
+fn init_and_the_shipped_recipe_are_one() {
+    let desk = Desk::new();
+    desk.meshmill(&["init", "cube.obj"]).assert().success();
+    let read = |path: &Path| toml::from_str::<toml::Table>(&fs::read_to_string(path).unwrap()).unwrap();
+    let mut made = read(&desk.path("cube.toml"));
+    let mut shipped = read(&Path::new(env!("CARGO_MANIFEST_DIR")).join("pipelines/fe-surface.toml"));
+    assert_eq!(made["name"].as_str(), Some("cube"));
+    assert_eq!(made["gates"]["fe"].as_table_mut().unwrap().remove("closed"), Some(toml::Value::Boolean(true)));
+    for key in ["name", "description", "inputs"] {
+        made.remove(key);
+        shipped.remove(key);
+    }
+    for recipe in [&mut made, &mut shipped] {
+        recipe["sweep"].as_table_mut().unwrap().remove("axes");
+        let params = recipe["params"].as_table_mut().unwrap();
+        assert!(params.remove("size").is_some() && params.remove("tolerance").is_some());
+        assert!(params.contains_key("min-gap") && params.contains_key("mean-stretch"));
+    }
+    assert_eq!(made, shipped);
+}
+
+#[test]
+fn init_looks_at_the_mesh_as_the_recipe_will() {
+    let desk = Desk::new();
+    // The top of the cube has vertices of its own, a hair beside those of the sides.
+    let loose = CUBE.replace("f 5 6 7\nf 5 7 8\n", "f 9 10 11\nf 9 11 12\n");
+    let top = "v 0 0 1.0000001\nv 1 0 1.0000001\nv 1 1 1.0000001\nv 0 1 1.0000001\n";
+    let (points, faces) = loose.split_at(loose.find("f ").unwrap());
+    fs::write(desk.path("loose.obj"), format!("{points}{top}{faces}")).unwrap();
+    desk.meshmill(&["init", "loose.obj"]).assert().success();
+    let text = fs::read_to_string(desk.path("loose.toml")).unwrap();
+    for found in ["# - 12 faces, 12 vertices, 1 body", "# - closed", "\nclosed = true", "4 vertices lie on others"] {
+        assert!(text.contains(found), "{found}: {text}");
+    }
+}
+
+#[test]
 fn a_search_finds_the_limit_and_writes_the_best_recipe() {
     let desk = Desk::new();
     let recipe = RECIPE.replace(

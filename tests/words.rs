@@ -192,3 +192,48 @@ fn what_failed_is_red_where_colours_are_shown() {
     let coloured = desk.meshmill(&["run", "recipe.toml"]).env("CLICOLOR_FORCE", "1").assert().code(3);
     coloured.stdout(contains("\u{1b}[1m\u{1b}[31mFAILED\u{1b}[0m"));
 }
+
+/// A run whose gate fails: what it says to try.
+fn advice(desk: &Desk, recipe: &str) -> String {
+    desk.write("recipe.toml", recipe);
+    let told = desk.told(&["run", "recipe.toml", "--report"], 3);
+    let json = desk.meshmill(&["run", "recipe.toml", "--json"]).assert().code(3).get_output().stdout.clone();
+    let json = String::from_utf8(json).unwrap();
+    let page = fs::read_to_string(desk.path("out/part/report.html")).unwrap();
+    let tried: Vec<&str> = told.lines().filter_map(|line| line.trim().strip_prefix("try: ")).collect();
+    for line in &tried {
+        let parts: Vec<&str> = line.split(": ").collect();
+        assert!(page.contains("Try: ") && json.contains(parts[1]), "{line}");
+    }
+    tried.join("\n")
+}
+
+#[test]
+fn a_failed_gate_says_what_to_turn() {
+    let desk = Desk::new();
+    let gate = |checks: &str| format!("{RECIPE}[gates.fe]\n{checks}\n");
+    let tried = advice(&desk, &gate("max-size = { at-most = \"1%\" }\nmax-valence = { at-most = 4 }"));
+    assert!(tried.contains("fe: max-size: lower `max-size` of `fe`"), "{tried}");
+    assert!(tried.contains("fe: max-valence: lower `max-valence` of `fe`, now 12"), "{tried}");
+    let tried = advice(&desk, &gate("min-stretch = { at-least = 0.9999 }\nfaces = { at-most = 2 }"));
+    assert!(tried.contains("fe: min-stretch: raise `min-stretch` of `fe`, now 0.2"), "{tried}");
+    assert!(tried.contains("or lower the limit to 0."), "{tried}");
+    let open = PART.replace("f 5 6 7\n", "");
+    desk.write("part.obj", &open);
+    let tried = advice(&desk, &gate("closed = true"));
+    assert!(tried.contains("fe: closed: write fill-holes = \"all\" in `clean`"), "{tried}");
+}
+
+#[test]
+fn a_region_that_stays_coarser_than_asked_for_is_told() {
+    let desk = Desk::new();
+    let recipe = RECIPE.replace("[outputs]\nfe = [\"result.vtu\"]", "")
+        + "[steps.near]\nuse = \"adapt-region\"\n\
+        from = \"fe.hierarchy\"\nsize = \"0.1%\"\nspheres = [{ centre = [0, 0, 0], radius = 0.5 }]\n[outputs]\n\
+        near = \"near.vtu\"\n";
+    desk.write("recipe.toml", &recipe);
+    for _ in 0..2 {
+        let told = desk.told(&["run", "recipe.toml"], 0);
+        assert!(told.contains("warning: near: at ") && told.contains("longer than asked for"), "{told}");
+    }
+}

@@ -1,4 +1,8 @@
 //! `meshmill init`: a commented recipe for a mesh, with sizes that suit it.
+//!
+//! The recipe is `pipelines/fe-surface.toml` with other values: there is one template, and what that recipe gains, this one
+//! gains too. The mesh is looked at as the recipe will see it, after `repair`: a CAD tessellation whose faces share no
+//! vertices is closed.
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -11,6 +15,7 @@ use crate::mesh::Soup;
 use crate::metric::{Measurement, Value, measure};
 use crate::report::measure::number_text;
 use crate::run::{Silent, write_named};
+use crate::steps::repair::{NonManifold, RepairError, RepairParams, RepairStats, repair};
 use crate::watch::Watch;
 
 /// Measure a mesh and write a commented recipe with sensible sizes for it. Asks nothing.
@@ -29,6 +34,9 @@ pub(super) struct Arguments {
 /// Elements that a first mesh of a part should have: enough for its shape, few enough to look at soon.
 const ELEMENTS: f64 = 10_000.0;
 
+/// The recipe that is filled in.
+const TEMPLATE: &str = include_str!("../../pipelines/fe-surface.toml");
+
 pub(super) fn run(arguments: &Arguments) -> Result<Exit, Fault> {
     let stem = arguments.mesh.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let name = folder_name(&stem);
@@ -43,7 +51,16 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Fault> {
     }
     let interrupt = Interrupt::listen();
     let watch = Watch::new(Arc::new(Silent), Arc::clone(&interrupt.cancelled));
-    let Ok(metrics) = measure(&soup, None, &watch) else { return Ok(interrupt.exit()) };
+    let params = RepairParams { non_manifold: NonManifold::Seam, ..RepairParams::default() };
+    let (repaired, stats) = match repair(&soup, &params, &watch) {
+        Ok(repaired) => repaired,
+        Err(RepairError::Cancelled(_)) => return Ok(interrupt.exit()),
+        Err(error) => {
+            let message = format!("{}: {error}", arguments.mesh.display());
+            return Err(Fault::usage(message).help("the recipe would find no surface in it"));
+        }
+    };
+    let Ok(metrics) = measure(&repaired.to_soup(), None, &watch) else { return Ok(interrupt.exit()) };
     let input = super::context::relative(&arguments.mesh, out.parent().unwrap_or(Path::new("")));
     let look = Look::of(&metrics);
     // The smallest and the largest lengths whose squares are numbers.
@@ -51,23 +68,19 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Fault> {
         let message = format!("{} has a diagonal of {}", arguments.mesh.display(), look.diagonal);
         return Err(Fault::usage(message).help("the recipe would find no surface in it"));
     }
-    let text = recipe((&name, &out.display().to_string()), &input, &soup, &look);
+    let text = recipe((&name, &out.display().to_string()), &input, &findings(&soup, &stats, &look), &look);
     write_named(&out, text.as_bytes())?;
     say(&format!("{}: written; `meshmill run {}` makes the mesh", out.display(), out.display()));
     Ok(Exit::Done)
 }
 
-/// What of a measurement a recipe is made of.
+/// What of the measurement of the repaired mesh a recipe is made of.
 struct Look {
-    faces: u64,
     diagonal: f64,
     area: f64,
-    /// Of triangles; quads have none.
-    min_stretch: Option<f64>,
-    mean_edge: Option<f64>,
+    min_stretch: f64,
+    mean_edge: f64,
     closed: bool,
-    manifold: bool,
-    oriented: bool,
     loops: u64,
     shells: u64,
     intersecting: u64,
@@ -77,14 +90,11 @@ impl Look {
     fn of(metrics: &Measurement) -> Self {
         let number = |name: &str| metrics.get(name).map_or(0.0, Value::as_f64);
         Self {
-            faces: number("faces") as u64,
             diagonal: number("diagonal"),
             area: number("area"),
-            min_stretch: metrics.get("min-stretch").map(Value::as_f64),
-            mean_edge: metrics.get("mean-edge").map(Value::as_f64),
+            min_stretch: number("min-stretch"),
+            mean_edge: number("mean-edge"),
             closed: number("closed") > 0.0,
-            manifold: number("manifold") > 0.0,
-            oriented: number("oriented") > 0.0,
             loops: number("boundary-loops") as u64,
             shells: number("shells") as u64,
             intersecting: number("self-intersecting-faces") as u64,
@@ -122,121 +132,82 @@ fn quoted(text: &str) -> String {
     toml::Value::from(text).to_string()
 }
 
-fn recipe((name, file): (&str, &str), input: &Path, soup: &Soup, look: &Look) -> String {
+fn recipe((name, file): (&str, &str), input: &Path, found: &str, look: &Look) -> String {
     let size = look.size();
     let length = |percent: f64| number_text(look.diagonal * percent / 100.0);
-    let found = findings(soup, look);
+    let percent = |percent: f64| format!("\"{}%\"", number_text(percent));
     let input = quoted(&input.to_string_lossy().replace('\\', "/"));
-    let closed = if look.closed {
-        "closed = true\n"
-    } else {
-        "# closed = true         # the mesh is open; fill-holes = \"all\" closes it\n"
-    };
-    let holes = if look.closed { "there are none" } else { "\"all\" closes them" };
-    format!(
-        r#"# Finite-element surface mesh of {input}.
-#
-{found}#
-#   meshmill run {file}                  makes the mesh, in out/{name}
-#   meshmill run {file} --set size=3%    coarser
-#   meshmill sweep {file}                compares a few sizes and tolerances
-#   meshmill steps NAME                       explains a step
-name = "{name}"
-
-[inputs]
-part = {input}
-
-[params]                  # percent of the diagonal, {diagonal}; a number without % is in mesh units
-size = "{size}%"             # aimed edge length, here {aimed}; {elements} such triangles would cover the part
-tolerance = "{tolerance}%"       # largest distance to the repaired input, here {allowed}
-min-stretch = 0.2         # smallest element quality; 1 is equilateral
-feature-angle = 30        # degrees; sharper edges stay where they are
-
-[steps.raw]
-use = "read"
-file = "=inputs.part"
-
-[steps.clean]             # a surface out of whatever the file holds
-use = "repair"
-from = "raw"
-fill-holes = "none"       # holes: {holes}
-non-manifold = "seam"
-
-[steps.marked]            # sharp edges stay
-use = "features"
-from = "clean"
-angle = "=feature-angle"
-method = "auto"
-
-[steps.improved]          # well-shaped triangles of the aimed size
-use = "improve-quality"
-from = "marked"
-reference = "clean"
-max-edge = "=size"
-tolerance = "=tolerance"
-
-[steps.dense]             # room to choose from
-use = "subdivide"
-from = "improved"
-
-[steps.fe]                # as coarse as the limits allow
-use = "control-properties"
-from = "dense"
-reference = "clean"
-tolerance = "=tolerance"
-min-stretch = "=min-stretch"
-max-size = "=2*size"
-max-valence = 10
-
-[gates.fe]                # counted again on the result; a file is written only where they hold
-min-stretch = {{ at-least = "=min-stretch" }}
-max-size = {{ to = "clean", at-most = "=2*size" }}
-distance = {{ to = "clean", at-most = "=tolerance" }}
-manifold = true
-oriented = true
-{closed}
-[outputs]
-fe = ["result.vtu", "result.inp", "result.stl"]
-
-[sweep]
-columns = ["faces", "min-stretch", "mean-stretch", "distance"]
-
-[sweep.axes]
-size = ["{fine}%", "{size}%", "{coarse}%"]
-tolerance = ["{tolerance}%", "{wide}%"]
-"#,
-        diagonal = number_text(look.diagonal),
-        aimed = length(size),
+    let body = TEMPLATE.split_once("\nname = ").map_or(TEMPLATE, |(_, body)| body);
+    let body = body.split_once('\n').map_or(body, |(_, body)| body);
+    let diagonal = number_text(look.diagonal);
+    let aimed = format!("aimed edge length, in percent of the diagonal ({diagonal}), here {}", length(size));
+    let allowed = format!("largest distance to the repaired input, both ways, here {}", length(size / 10.0));
+    let closed =
+        if look.closed { "closed = true" } else { "# closed = true   # it is open; fill-holes = \"all\" closes it" };
+    let lists =
+        [(size / 2.0, size / 10.0), (size, size / 5.0), (size * 2.0, 0.0)].map(|(a, b)| (percent(a), percent(b)));
+    let [(fine, tight), (middle, wide), (coarse, _)] = &lists;
+    let mut text = format!(
+        "# Finite-element surface mesh of {input}.\n#\n{found}#\n\
+         #   meshmill run {file}                  makes the mesh, in out/{name}\n\
+         #   meshmill run {file} --set size=3%    coarser\n\
+         #   meshmill sweep {file}                compares a few sizes and tolerances\n\
+         #   meshmill steps NAME                  explains a step\n\
+         #\n# A number without % is in mesh units. {elements} elements of the size below would cover the part.\n\
+         name = \"{name}\"\n{body}",
         elements = number_text(ELEMENTS),
-        tolerance = number_text(size / 10.0),
-        allowed = length(size / 10.0),
-        fine = number_text(size / 2.0),
-        coarse = number_text(size * 2.0),
-        wide = number_text(size / 5.0),
-    )
+    );
+    for (section, key, line) in [
+        ("", "description", format!("description = {}", quoted(&format!("Finite-element surface mesh of {name}")))),
+        ("inputs", "part", format!("part = {input}")),
+        ("params", "size", format!("size = {:<15}# {aimed}", percent(size))),
+        ("params", "tolerance", format!("tolerance = {:<10}# {allowed}", percent(size / 10.0))),
+        ("gates.fe", "oriented", format!("oriented = true\n{closed}")),
+        ("sweep.axes", "size", format!("size = [{fine}, {middle}, {coarse}]")),
+        ("sweep.axes", "tolerance", format!("tolerance = [{tight}, {wide}]")),
+    ] {
+        text = with_line(&text, section, key, &line);
+    }
+    text
+}
+
+/// The recipe with the line of a key in a section replaced.
+fn with_line(recipe: &str, section: &str, key: &str, line: &str) -> String {
+    let (mut text, mut here) = (String::new(), "");
+    for old in recipe.lines() {
+        if let Some(head) = old.strip_prefix('[').and_then(|rest| rest.split_once(']')) {
+            here = head.0;
+        }
+        let is_it = here == section && old.split_once('=').is_some_and(|(name, _)| name.trim() == key);
+        text.push_str(if is_it { line } else { old });
+        text.push('\n');
+    }
+    text
 }
 
 /// What was found, as comments, with what the recipe does about it.
-fn findings(soup: &Soup, look: &Look) -> String {
+fn findings(soup: &Soup, stats: &RepairStats, look: &Look) -> String {
     let mut text = String::new();
     let mut line = |words: String| {
         // Writing to a string cannot fail.
         let _ = writeln!(text, "# - {words}");
     };
     let bodies = if look.shells == 1 { "body" } else { "bodies" };
-    line(format!("{} faces, {} vertices, {} {bodies}", look.faces, soup.points.len(), look.shells));
-    if let (Some(edge), Some(stretch)) = (look.mean_edge, look.min_stretch) {
-        line(format!("mean edge {}, smallest stretch {}", number_text(edge), number_text(stretch)));
-    }
+    line(format!("{} faces, {} vertices, {} {bodies}", soup.faces.len(), soup.points.len(), look.shells));
+    line(format!("mean edge {}, smallest stretch {}", number_text(look.mean_edge), number_text(look.min_stretch)));
     if look.closed {
         line("closed".to_owned());
     } else {
         line(format!("open, with {} boundary loops", look.loops));
     }
-    if !look.manifold {
+    let joined = stats.vertices_merged + stats.vertices_welded + stats.t_junctions;
+    if joined > 0 {
+        line(format!("{joined} vertices lie on others or beside edges: `repair` joins them"));
+    }
+    if stats.non_manifold_edges_cut + stats.vertices_cut > 0 {
         line("not manifold: `repair` cuts it there and keeps the sheets joined".to_owned());
     }
-    if !look.oriented {
+    if stats.faces_turned + stats.components_turned > 0 {
         line("not oriented: `repair` turns faces outward".to_owned());
     }
     if look.intersecting > 0 {

@@ -15,8 +15,9 @@ use super::report;
 use super::signals::Interrupt;
 use super::trace::Trace;
 use super::unchanged::Unchanged;
+use crate::plan::in_case;
 use crate::report::json::Kind;
-use crate::report::{Report, Status, record, table};
+use crate::report::{Report, Status, StepReport, record, table};
 use crate::run::{self, Observer, RunError, RunOptions, RunOutcome};
 use crate::store::Store;
 use crate::store::stamp::Said;
@@ -98,7 +99,8 @@ pub(super) fn once(arguments: &Arguments, global: &Global, interrupt: &Interrupt
     }
     if let (Some(unchanged), Status::Done, true) = (unchanged, report.status, saved) {
         let out = if global.quiet { String::new() } else { table::report(&report.unchanged()) };
-        let said = Said { out, err: left_out(&report), exit: 0 };
+        let err = [left_out(&report), warnings(&report)].concat();
+        let said = Said { out, err, exit: 0 };
         unchanged.remember(&store, (seen, report.written().collect()), said, &report, &options.out)?;
     }
     Ok(report.status.into())
@@ -266,8 +268,14 @@ pub(super) fn tell(report: &Report, json: bool, quiet: bool) -> Result<(), Fault
             ));
         }
     }
+    warnings(report).iter().for_each(|warning| say(warning));
     match report.status {
-        Status::GateFailed => say(&gates_failed(report)),
+        Status::GateFailed => {
+            say(&gates_failed(report));
+            for gate in report.cases.iter().flat_map(|case| &case.gates) {
+                gate.advice.iter().for_each(|advice| say(&format!("  try: {}: {advice}", gate.step)));
+            }
+        }
         Status::Cancelled => say("interrupted; the next run goes on from the last finished task"),
         Status::Done | Status::Differs | Status::BadInput | Status::StepFailed => {}
     }
@@ -292,6 +300,19 @@ pub(super) fn left_out(report: &Report) -> Vec<String> {
         lines.push(format!("and {rest} more lines about what was left out on reading"));
     }
     lines
+}
+
+/// What steps say that their results lack.
+fn warnings(report: &Report) -> Vec<String> {
+    let steps =
+        report.cases.iter().flat_map(|case| case.steps.iter().map(move |step| (in_case(&case.name, &step.name), step)));
+    let of = |(name, step): (String, &StepReport)| {
+        let list =
+            step.stats.as_ref().and_then(|stats| stats.get("warnings")).and_then(|list| list.as_array()).cloned();
+        let texts = list.unwrap_or_default().into_iter().filter_map(|text| text.as_str().map(str::to_owned));
+        texts.map(|text| format!("warning: {name}: {text}")).collect::<Vec<_>>()
+    };
+    steps.flat_map(of).collect()
 }
 
 /// Which checks did not hold.

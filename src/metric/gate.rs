@@ -75,6 +75,16 @@ pub enum FaultKind {
     ReferenceFace,
 }
 
+/// Where most of the faces at fault lie, where that tells what to turn. With their number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Cause {
+    /// From one marked curve to another that runs close to it.
+    BetweenCurves(u64),
+    /// In a corner between two marked edges.
+    AtCurves(u64),
+}
+
 /// The outcome of one check.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct GateRow {
@@ -94,6 +104,9 @@ pub struct GateRow {
     pub faults: Vec<Fault>,
     /// Faces excused, worst first, at most [`MAX_FAULTS`].
     pub excused: Vec<Fault>,
+    /// Where the faces at fault lie, for checks of shape.
+    #[serde(default)]
+    pub cause: Option<Cause>,
     /// What else there is to say: excused faces and why, a bound that was not met exactly.
     pub note: Option<String>,
 }

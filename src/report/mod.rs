@@ -3,6 +3,7 @@
 //! [`Report`] is the one model: `run.ron` is its RON, `--json` its JSON, the terminal shows its tables. Everything that
 //! repeats from run to run stands apart from `timings`, which does not.
 
+mod advice;
 pub mod diff;
 pub mod json;
 pub mod lock;
@@ -123,6 +124,9 @@ pub struct GateSection {
     pub rows: Vec<GateRow>,
     /// Why checks could not be decided.
     pub failures: Vec<StepFailure>,
+    /// For checks that failed: `METRIC: which step and parameter to turn`.
+    #[serde(default)]
+    pub advice: Vec<String>,
 }
 
 /// An output file.
@@ -340,7 +344,8 @@ fn gate_section(names: &Names<'_>, gate: &Gate, outcome: &RunOutcome) -> GateSec
     references.sort_unstable();
     references.dedup();
     let (rows, failures) = (Vec::new(), Vec::new());
-    let mut section = GateSection { step: gate.step.clone(), references, passed: Some(true), rows, failures };
+    let advice = Vec::new();
+    let mut section = GateSection { step: gate.step.clone(), references, passed: Some(true), rows, failures, advice };
     for task in gate.tasks.iter().map(|task| outcome.task(*task)) {
         match task.gate_report() {
             Some(report) => {
@@ -351,6 +356,8 @@ fn gate_section(names: &Names<'_>, gate: &Gate, outcome: &RunOutcome) -> GateSec
         }
         section.failures.extend(task.failure.clone());
     }
+    let name = |task| names.of(task);
+    section.advice = advice::advice(names.plan, gate.target, &section.references, &section.rows, &name);
     section
 }
 

@@ -127,7 +127,7 @@ pub fn adapt_curvature(
     front.refine_faces_to(&thresholds, watch)?;
     // A size of 0 asks for the smallest faces there are.
     let wish = |leaf| if thresholds[leaf] > 0.0 { thresholds[leaf] } else { f64::INFINITY };
-    let vertices_coarser = front.count_coarser(wish);
+    let (vertices_coarser, _) = front.coarser(wish);
     let (mesh, report) = extract_measured(&front, params.polish, watch)?;
     Ok((mesh, AdaptCurvatureStats { base_faces, largest, vertices_coarser, front: report }))
 }

@@ -159,6 +159,22 @@ async function look(browser, file, scheme, width, isFirst) {
   return seconds;
 }
 
+/** Without WebGL the pictures stand in the place of the meshes. */
+async function withoutWebGl(browser, file) {
+  const context = await browser.newContext({ offline: true });
+  const page = await context.newPage();
+  await page.addInitScript(() => {
+    HTMLCanvasElement.prototype.getContext = () => null;
+  });
+  await page.goto(pathToFileURL(resolve(file)).href);
+  if (await page.locator("#viewer").count()) {
+    await page.waitForSelector("#viewer:not([hidden]) .note");
+    const widths = await page.locator("#viewer img").evaluateAll((all) => all.map((image) => image.naturalWidth));
+    check(widths.length > 0 && widths.every((width) => width > 0), `${basename(file)}: no picture where there is no WebGL`);
+  }
+  await context.close();
+}
+
 const files = process.argv.slice(2);
 const executablePath = CHROMIUM.find((path) => path && existsSync(path));
 if (!executablePath || files.length === 0) {
@@ -176,6 +192,7 @@ for (const file of files) {
   for (const scheme of ["light", "dark"]) {
     for (const width of [1280, 390]) times.push(await look(browser, file, scheme, width, times.length === 0));
   }
+  await withoutWebGl(browser, file);
   console.log(`${file}: ${(bytes / 1e6).toFixed(2)} MB, open after ${times.map((t) => t.toFixed(2)).join(", ")} s`);
 }
 await browser.close();

@@ -145,6 +145,7 @@ fn row(check: &Check, bounds: &Bounds) -> GateRow {
         fault_count: 0,
         faults: Vec::new(),
         excused: Vec::new(),
+        cause: None,
         note: None,
     }
 }
@@ -184,6 +185,9 @@ fn judge_column(subject: &Subject<'_>, check: &Check, column: Column, bounds: &B
             Extreme::Least => measured.map_or(value, |m| m.min(value)),
             Extreme::Largest => measured.map_or(value, |m| m.max(value)),
         });
+    }
+    if column.kind == FaultKind::Face {
+        out.cause = fault::cause(subject.mesh(), faults.iter().map(|fault| FaceId::from_raw(fault.id)));
     }
     let badness = |v: f64| if column.extreme == Extreme::Least { -v } else { v };
     (out.fault_count, out.faults) = worst(faults, badness);

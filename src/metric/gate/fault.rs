@@ -7,8 +7,8 @@ use super::super::intersection::faces_of;
 use super::super::registry::{LOW_SCALED_JACOBIAN, LOW_STRETCH};
 use super::super::shape::angle_of_stretch;
 use super::column::fault_at;
-use super::{Fault, FaultKind};
-use crate::mesh::{EdgeKey, FaceId, Facet, Soup, edge_key, geometry};
+use super::{Cause, Fault, FaultKind};
+use crate::mesh::{EdgeKey, FaceId, Facet, Soup, VertexId, edge_key, geometry};
 
 /// The elements at fault for a count, a share or a property of the whole mesh; empty where there are none to name.
 pub(super) fn of_whole(subject: &Subject<'_>, name: &str) -> Vec<Fault> {
@@ -81,6 +81,28 @@ pub(super) fn is_excused(mesh: &Soup, face: FaceId, angle_needed: f64) -> bool {
         let (j, k) = ((i + 1) % 3, (i + 2) % 3);
         is_marked(i, j) && is_marked(i, k) && angles[i] < angle_needed
     })
+}
+
+/// Where more than half of some faces lie in relation to the marked edges.
+pub(super) fn cause(mesh: &Soup, faces: impl Iterator<Item = FaceId>) -> Option<Cause> {
+    let marks = &mesh.carried.marks;
+    let on_curve: BTreeSet<VertexId> = marks.keys().flatten().copied().collect();
+    let (mut all, mut between, mut at) = (0_u64, 0_u64, 0_u64);
+    for face in faces {
+        all += 1;
+        let Some(facet) = mesh.faces.get(face) else { continue };
+        let corners = facet.corners();
+        let sides = (0..corners.len()).map(|i| edge_key(corners[i], corners[(i + 1) % corners.len()]));
+        match sides.filter(|side| marks.contains_key(side)).count() {
+            0 | 1 => between += u64::from(corners.iter().all(|v| on_curve.contains(v))),
+            _ => at += 1,
+        }
+    }
+    match (2 * between > all, 2 * at > all) {
+        (true, _) => Some(Cause::BetweenCurves(between)),
+        (false, true) => Some(Cause::AtCurves(at)),
+        (false, false) => None,
+    }
 }
 
 /// The angle that [`is_excused`] needs for a stretch.

@@ -61,6 +61,21 @@ fn a_face_between_marked_edges_is_excused_below_the_angle_of_the_threshold() {
 }
 
 #[test]
+fn where_the_faces_at_fault_lie_is_told() {
+    let mut mesh = with_needle();
+    let mark = EdgeMark { freedom: Freedom::OnCurve, cause: MarkCause::Feature };
+    let low = at_least("min-stretch", 0.2);
+    assert_eq!(one(&mesh, None, low.clone()).cause, None);
+    // From the curve along 0-3 to one that passes through vertex 4.
+    for ends in [[0, 3], [4, 1]] {
+        mesh.carried.mark(edge_key(VertexId::from_raw(ends[0]), VertexId::from_raw(ends[1])), mark);
+    }
+    assert_eq!(one(&mesh, None, low).cause, Some(Cause::BetweenCurves(1)));
+    mesh.carried.mark(edge_key(VertexId::from_raw(3), VertexId::from_raw(4)), mark);
+    assert_eq!(one(&mesh, None, at_least("min-stretch", 0.12)).cause, Some(Cause::AtCurves(1)));
+}
+
+#[test]
 fn one_marked_edge_is_no_excuse() {
     let mut mesh = with_needle();
     let mark = EdgeMark { freedom: Freedom::Keep, cause: MarkCause::Locked };

@@ -77,7 +77,9 @@ pub(super) fn tiles(case: &CaseReport, outline: &Outline, gathered: &Gathered) -
     let begun = outline.reference.as_ref().and_then(|name| gathered.meshes.get(name));
     let tile = |name: &&str| {
         let metric = registry::find(name)?;
-        let measured = known.measurement.get(name)?;
+        // A gate bounds a distance until it is decided; the page must not say another number beside that.
+        let gated = gated(case, outline, name);
+        let measured = gated.or_else(|| known.measurement.get(name))?;
         let before = begun.filter(|begun| begun.content != known.content).and_then(|begun| begun.measurement.get(name));
         let note = match (before, &outline.reference, &outline.reference) {
             (Some(before), Some(reference), _) => format!("{} in {reference}", value(&before, metric.unit)),
@@ -95,6 +97,14 @@ pub(super) fn tiles(case: &CaseReport, outline: &Outline, gathered: &Gathered) -
         tiles.push(Tile { title: "Checks passed".to_owned(), value, unit: "", note: note.to_owned() });
     }
     tiles
+}
+
+/// What a gate of the result measured, against the mesh that the page compares with.
+fn gated(case: &CaseReport, outline: &Outline, metric: &str) -> Option<Value> {
+    let (result, reference) = (outline.result.as_ref()?, outline.reference.as_ref()?);
+    let gates = case.gates.iter().filter(|gate| gate.step == *result && gate.references.contains(reference));
+    let mut rows = gates.flat_map(|gate| &gate.rows);
+    rows.find(|row| row.metric == metric && metric == "distance").and_then(|row| row.measured)
 }
 
 /// `min-stretch` as `Min stretch`.
@@ -232,6 +242,7 @@ pub(super) struct GateView {
     class: &'static str,
     rows: Vec<RowView>,
     failures: Vec<String>,
+    advice: Vec<String>,
 }
 
 #[derive(Serialize)]
@@ -272,6 +283,7 @@ pub(super) fn gates(case: &CaseReport) -> Vec<GateView> {
             verdict,
             class,
             rows: gate.rows.iter().map(|row| row_view(row, &gate.step, gate.references.first())).collect(),
+            advice: gate.advice.clone(),
             failures: gate.failures.iter().map(|failure| failure.message.clone()).collect(),
         }
     };

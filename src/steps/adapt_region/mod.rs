@@ -29,6 +29,7 @@ use serde::Serialize;
 use crate::mesh::hierarchy::{Hierarchy, NodeId};
 use crate::mesh::id::{IdVec, Vertex};
 use crate::mesh::{Soup, Surface};
+use crate::metric::number::number_text;
 use crate::step::{
     Artifact, InputDef, Inputs, Locks, OutPort, OutputDef, Port, Produced, Step as StepContract, StepFailure,
 };
@@ -48,6 +49,8 @@ pub struct AdaptRegionStats {
     pub vertices_selected: usize,
     /// Vertices of the region at which a face has a longer side than asked for: one of the finest mesh.
     pub vertices_coarser: usize,
+    /// What the result lacks of what was asked for; a run says it.
+    pub warnings: Vec<String>,
     /// The mesh.
     pub front: FrontReport,
 }
@@ -132,9 +135,26 @@ pub fn adapt_region(
     let thresholds: Thresholds = region_thresholds(hierarchy, |leaf| wishes[leaf]);
     watch.phase("refine", None);
     front.refine_faces_to(&thresholds, watch)?;
-    let coarser = front.count_coarser(|leaf| thresholds[leaf]);
+    let (coarser, worst) = front.coarser(|leaf| thresholds[leaf]);
     let (mesh, report) = extract_measured(&front, params.polish, watch)?;
-    Ok((mesh, AdaptRegionStats { base_faces, vertices_selected: selected, vertices_coarser: coarser, front: report }))
+    let stats = AdaptRegionStats {
+        base_faces,
+        vertices_selected: selected,
+        vertices_coarser: coarser,
+        warnings: worst.map(|worst| shortfall(coarser, selected, worst)).into_iter().collect(),
+        front: report,
+    };
+    Ok((mesh, stats))
+}
+
+/// What is said where the finest mesh itself is coarser than what was asked for.
+fn shortfall(coarser: usize, selected: usize, [side, wish]: [f64; 2]) -> String {
+    format!(
+        "at {coarser} of the {selected} vertices of the region sides are longer than asked for (up to {}, where {} was \
+         asked for): the finest mesh of the hierarchy has no shorter ones there; make the hierarchy of a finer mesh",
+        number_text(side),
+        number_text(wish)
+    )
 }
 
 /// The size wanted at each vertex of the finest mesh; infinite outside the region.

@@ -91,12 +91,20 @@ impl Front<'_> {
         }
     }
 
-    /// Vertices of the finest mesh at whose place here a face has a longer side than wished for there.
-    /// O(nodes + finest faces).
-    pub fn count_coarser(&self, wish: impl Fn(NodeId) -> f64) -> usize {
+    /// Vertices of the finest mesh at whose place here a face has a longer side than wished for there, and the side and
+    /// the wish that lie farthest apart. O(nodes + finest faces).
+    pub fn coarser(&self, wish: impl Fn(NodeId) -> f64) -> (usize, Option<[f64; 2]>) {
         let (stands, longest) = (self.representatives(), self.longest_sides());
-        let is_coarser = |leaf: &NodeId| stands[*leaf].is_some_and(|node| longest[node] > wish(*leaf));
-        self.hierarchy().nodes().take(self.hierarchy().leaf_count()).filter(is_coarser).count()
+        let (mut count, mut worst) = (0, None);
+        for leaf in self.hierarchy().nodes().take(self.hierarchy().leaf_count()) {
+            let Some(side) = stands[leaf].map(|node| longest[node]).filter(|&side| side > wish(leaf)) else { continue };
+            count += 1;
+            let excess = side / wish(leaf);
+            if worst.is_none_or(|[side, wish]: [f64; 2]| excess > side / wish) {
+                worst = Some([side, wish(leaf)]);
+            }
+        }
+        (count, worst)
     }
 
     /// The end of a face's longest side that was merged last, where the side is too long for a corner; `None` where it is

@@ -344,6 +344,27 @@ function sortable(table) {
   });
 }
 
+/** The pictures of the page in the place of the meshes, for a browser without WebGL; the rest is as good as before. */
+function pictures(names, error) {
+  const make = (tag, attributes, ...children) => {
+    const element = Object.assign(document.createElement(tag), attributes);
+    element.append(...children);
+    return element;
+  };
+  const known = [...document.querySelectorAll("article.step, .gallery figure, figure")]
+    .map((place) => [place.querySelector("h3, figcaption a")?.textContent.trim(), place.querySelector("img")])
+    .filter(([name, image]) => name && image);
+  const wanted = known.filter(([name]) => names.includes(name));
+  const figure = ([name, image]) => {
+    const copy = image.cloneNode();
+    copy.loading = "eager";
+    return make("figure", { className: "pane still" }, make("figcaption", { textContent: name }), copy);
+  };
+  const shown = (wanted.length ? wanted : known).slice(0, 12).map(figure);
+  const words = `This browser shows no meshes in 3D (${error.message})${shown.length ? "; these are pictures of them." : "."}`;
+  return [make("p", { className: "note", textContent: words }), make("div", { className: "panes" }, ...shown)];
+}
+
 function begin() {
   document.querySelectorAll("table.sortable").forEach(sortable);
   const data = $("data");
@@ -354,8 +375,7 @@ function begin() {
   try {
     new Viewer(content).start();
   } catch (error) {
-    // Without WebGL the rest of the page is as good as before.
-    $("viewer").replaceChildren(Object.assign(document.createElement("p"), { className: "note", textContent: `The meshes cannot be shown here: ${error.message}` }));
+    $("viewer").replaceChildren(...pictures(content.meshes.map((mesh) => mesh.name), error));
   }
 }
 
