@@ -268,12 +268,16 @@ pub(super) fn tell(report: &Report, json: bool, quiet: bool) -> Result<(), Fault
             ));
         }
     }
-    warnings(report).iter().for_each(|warning| say(warning));
+    for warning in warnings(report) {
+        say(&warning);
+    }
     match report.status {
         Status::GateFailed => {
             say(&gates_failed(report));
             for gate in report.cases.iter().flat_map(|case| &case.gates) {
-                gate.advice.iter().for_each(|advice| say(&format!("  try: {}: {advice}", gate.step)));
+                for advice in &gate.advice {
+                    say(&format!("  try: {}: {advice}", gate.step));
+                }
             }
         }
         Status::Cancelled => say("interrupted; the next run goes on from the last finished task"),

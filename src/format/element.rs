@@ -25,7 +25,7 @@ use super::error::{FormatError, Place, Reason};
 use super::polygon::triangulate;
 use super::skin::{Own, Volumes, volume_corners};
 use super::{Element, ReadCounts, WriteOptions};
-use crate::mesh::{EdgeKey, Facet, Soup, Support, VertexId, edge_key};
+use crate::mesh::{EdgeKey, Facet, Field, Soup, Support, VertexId, edge_key};
 
 /// The shape of an element. Corner nodes come first in all formats we read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -282,6 +282,23 @@ impl Elevated {
     /// The mid-side nodes of face `face` with this many corners.
     pub(super) fn of(&self, face: usize, corners: usize) -> &[u32] {
         &self.sides[face][..corners]
+    }
+
+    /// The rows of a vertex field on the mid-side nodes: the mean of the ends of each.
+    pub(super) fn means(&self, soup: &Soup, field: &Field) -> Vec<f64> {
+        let width = field.components;
+        let mut rows = vec![0.0; self.points.len() * width];
+        for (i, face) in soup.faces.iter().enumerate() {
+            let corners = face.corners();
+            for (side, &node) in self.of(i, corners.len()).iter().enumerate() {
+                let ends = [corners[side], corners[(side + 1) % corners.len()]].map(|v| v.index() * width);
+                let row = (node as usize - soup.points.len()) * width;
+                for k in 0..width {
+                    rows[row + k] = 0.5 * (field.values[ends[0] + k] + field.values[ends[1] + k]);
+                }
+            }
+        }
+        rows
     }
 }
 

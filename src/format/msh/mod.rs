@@ -13,10 +13,15 @@
 //! parameters of nodes are skipped. `NodeData` and `ElementData` become fields, of several time steps the last one.
 //!
 //! Writing: version 4.1 (`msh`) or 2.2 (`msh22`). Faces in the same groups are one entity; groups and regions are
-//! physical groups with names. Faces keep their order. Fields are written padded with zeros to 3 or 9 components, the
+//! physical groups with names. In version 4.1 faces of no group are the physical group `(no group)` where there are groups
+//! at all, since some readers (meshio 5) want all elements in groups or none, and Gmsh itself saves only what is in one;
+//! reading takes it back. Faces keep their order. Fields are written padded with zeros to 3 or 9 components, the
 //! widths that Gmsh knows; wider ones, marks and pins are not written.
 //!
 //! Linear in the size of the file.
+
+/// The physical group of faces that are in none.
+const NO_GROUP: &str = "(no group)";
 
 mod read;
 mod v2;

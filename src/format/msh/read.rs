@@ -10,7 +10,7 @@ use super::super::binary::ByteOrder;
 use super::super::element::{Elements, Placed, Shape};
 use super::super::error::{FormatError, Place, Reason, excerpt};
 use super::super::mixed::Input;
-use super::{element_type, is_quad, v2, v4, volume_corners};
+use super::{NO_GROUP, element_type, is_quad, v2, v4, volume_corners};
 use crate::mesh::{EdgeKey, FaceId, Field, Soup, Support, VertexId};
 use crate::watch::Watch;
 
@@ -389,7 +389,10 @@ impl Model<'_> {
             }
         }
         for (key, members) in std::mem::take(&mut self.groups) {
-            named.push((names.get(&key).cloned().unwrap_or_else(|| format!("physical_{}", key.1)), members));
+            let name = names.get(&key).cloned().unwrap_or_else(|| format!("physical_{}", key.1));
+            if name != NO_GROUP {
+                named.push((name, members));
+            }
         }
         let groups = &mut soup.carried.groups;
         for (name, members) in named {

@@ -1,5 +1,6 @@
 //! Writes Gmsh files.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use glam::DVec3;
@@ -9,11 +10,14 @@ use super::super::element::{Elevated, elevate_for};
 use super::super::error::{FormatError, Place, Reason};
 use super::super::sets::face_sets;
 use super::super::text::{push_integer, push_number};
+use super::NO_GROUP;
 use crate::mesh::{Facet, Soup, Support, VertexId};
 
 /// Writes version 4.1.
 pub(super) fn write_v4(soup: &Soup, options: &WriteOptions<'_>) -> Result<Vec<u8>, FormatError> {
-    Layout::of(soup, options).write(soup, options, true)
+    let mut layout = Layout::of(soup, options);
+    layout.name_the_rest();
+    layout.write(soup, options, true)
 }
 
 /// Writes version 2.2.
@@ -79,6 +83,16 @@ impl Layout {
         layout
     }
 
+    /// Gives the faces of no group one, where there are groups.
+    fn name_the_rest(&mut self) {
+        let tag = self.names.iter().filter(|(dimension, ..)| *dimension == 2).count() as i32 + 1;
+        let rest = self.entities.iter_mut().find(|entity| entity.dimension == 2 && entity.physicals.is_empty());
+        if let Some(rest) = rest.filter(|_| !self.names.is_empty()) {
+            rest.physicals.push(tag);
+            self.names.push((2, tag, NO_GROUP.to_owned()));
+        }
+    }
+
     /// The lines or points of groups, each once.
     fn lower<'a>(&mut self, dimension: i32, kind: i32, groups: impl Iterator<Item = (&'a String, Vec<Vec<u32>>)>) {
         let mut cells: BTreeMap<Vec<u32>, Vec<i32>> = BTreeMap::new();
@@ -137,7 +151,7 @@ impl Layout {
             numbers.push(next);
             next += if version_4 { 1 } else { self.entities[cell.entity].physicals.len().max(1) as i32 };
         }
-        fields(&mut out, soup, &numbers);
+        fields(&mut out, soup, &numbers, self.elevated.as_ref());
         Ok(out.bytes)
     }
 
@@ -260,11 +274,16 @@ fn nodes_v2(out: &mut Out, points: &[DVec3]) {
 }
 
 /// Fields with the widths that Gmsh knows; values that are not known (NaN) are left out, as it is meant.
-fn fields(out: &mut Out, soup: &Soup, faces: &[i32]) {
+/// A mid-side node has the mean of its ends: some readers want a value at each node or at none.
+fn fields(out: &mut Out, soup: &Soup, faces: &[i32], elevated: Option<&Elevated>) {
     for field in soup.carried.fields.iter().filter(|f| f.components <= 9) {
         let section = if field.support == Support::Vertex { "NodeData" } else { "ElementData" };
         let width = [1, 3, 9].into_iter().find(|&w| w >= field.components).unwrap_or(9);
-        let rows = field.values.chunks_exact(field.components).enumerate();
+        let values = match elevated.filter(|_| field.support == Support::Vertex) {
+            Some(elevated) => Cow::Owned([&field.values[..], &elevated.means(soup, field)].concat()),
+            None => Cow::Borrowed(&field.values),
+        };
+        let rows = values.chunks_exact(field.components).enumerate();
         let rows: Vec<(usize, &[f64])> = rows.filter(|(_, row)| row.iter().all(|v| v.is_finite())).collect();
         let name = field.name.replace('"', "'").replace(['\n', '\r'], " ");
         out.text(&format!("${section}\n1\n\"{name}\"\n1\n0\n3\n0\n{width}\n{}\n", rows.len()));

@@ -94,7 +94,7 @@ impl DataSet {
             let mut values = values.clone();
             match support {
                 Support::Face => values.extend(std::iter::repeat_n(f64::NAN, lines * components)),
-                Support::Vertex => values.extend(elevated.iter().flat_map(|e| means(soup, e, field))),
+                Support::Vertex => values.extend(elevated.iter().flat_map(|e| e.means(soup, field))),
             }
             let array = Array { name: name.clone(), components: *components, values: Values::Float(values) };
             match support {
@@ -110,21 +110,4 @@ fn lines(soup: &Soup) -> BTreeMap<EdgeKey, usize> {
     let mut lines: BTreeMap<EdgeKey, usize> = soup.carried.groups.edges.values().flatten().map(|&e| (e, 0)).collect();
     lines.values_mut().enumerate().for_each(|(i, place)| *place = i);
     lines
-}
-
-/// The rows of `field` on the mid-side nodes.
-fn means(soup: &Soup, elevated: &Elevated, field: &Field) -> Vec<f64> {
-    let width = field.components;
-    let mut rows = vec![0.0; elevated.points.len() * width];
-    for (i, face) in soup.faces.iter().enumerate() {
-        let corners = face.corners();
-        for (side, &node) in elevated.of(i, corners.len()).iter().enumerate() {
-            let ends = [corners[side], corners[(side + 1) % corners.len()]].map(|v| v.index() * width);
-            let row = (node as usize - soup.points.len()) * width;
-            for k in 0..width {
-                rows[row + k] = 0.5 * (field.values[ends[0] + k] + field.values[ends[1] + k]);
-            }
-        }
-    }
-    rows
 }
