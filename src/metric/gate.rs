@@ -76,7 +76,7 @@ pub enum FaultKind {
 }
 
 /// Where most of the faces at fault lie, where that tells what to turn. With their number.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Cause {
     /// From one marked curve to another that runs close to it.
