@@ -13,9 +13,6 @@ use crate::technique::collapse::{Editor, Keeper};
 /// Without a certified distance, an edge is flipped only where its faces differ by less than 5 degrees.
 const FLAT_COSINE: f64 = 0.996;
 
-/// What a split may leave of a stretch that is below the threshold already.
-const SPLIT_LOSS: f64 = 0.25;
-
 /// When an edit is worth it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Gain {
@@ -105,8 +102,9 @@ impl Editor<'_> {
         })
     }
 
-    /// Splits the edge at `at` where all tests admit it, and no face falls below the least stretch; where one is there
-    /// already, the halves may be a little worse, since more can be done with them.
+    /// Splits the edge at `at` where all tests admit it, and no face falls below the least stretch, or below the worst of
+    /// the old ones where one is there already. Losses of single splits would multiply where kept edges leave nothing to
+    /// mend them with.
     pub fn try_split(&mut self, edge: EdgeId, at: DVec3) -> Option<VertexId> {
         let plan = check_split(&self.mesh, edge).ok()?;
         let h = halfedge_of(edge);
@@ -155,9 +153,7 @@ impl Editor<'_> {
 
     fn split_keeps_stretch(&self) -> bool {
         let before = self.patch.old.iter().map(|&f| self.stretch(f)).fold(f64::INFINITY, f64::min);
-        let limit = self.limits.min_stretch;
-        let floor = least_stretch(limit, before);
-        let floor = if floor < limit { SPLIT_LOSS * floor } else { floor };
+        let floor = least_stretch(self.limits.min_stretch, before);
         self.patch.points.iter().all(|points| stretch(*points) >= floor)
     }
 
@@ -253,7 +249,7 @@ impl Editor<'_> {
             Gain::LeastAngle => {
                 let old = self.patch.old.iter().map(|&f| least_sine(self.mesh.corner_points(f)));
                 let new = self.patch.points.iter().map(|&points| least_sine(points));
-                new.fold(1.0, f64::min) > old.fold(1.0, f64::min) * (1.0 + 1e-6)
+                after.stretch_min >= floor && new.fold(1.0, f64::min) > old.fold(1.0, f64::min) * (1.0 + 1e-6)
             }
             Gain::Quality => after.stretch_min >= floor && after.quality() > before.quality() * (1.0 + 2e-3),
             Gain::Mean(least) => {
