@@ -8,7 +8,7 @@ use serde_json::Value as Json;
 use crate::metric::Value;
 use crate::metric::gate::{Cause, GateRow};
 use crate::metric::number::number_text;
-use crate::plan::{Plan, StepTask, Task, TaskId};
+use crate::run::{Plan, StepTask, Task, TaskId};
 use crate::step::parameters::ParameterSchema;
 
 /// A step that the judged mesh came through.

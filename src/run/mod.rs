@@ -51,7 +51,7 @@ pub use schedule::run;
 pub use shared::{VERSION, recipe_task};
 
 // An outcome speaks of these, so whoever reads outcomes finds them here.
-pub use crate::plan::{Case, Change, Column, Gate, Output, Plan, Record, Task, TaskId, in_case};
+pub use crate::plan::{Case, Change, Column, Gate, Output, Plan, Record, StepTask, Task, TaskId, in_case};
 pub use crate::store::{Entry, Figures, Outcome, StoreError};
 
 /// What the caller decides about a run.
