@@ -32,7 +32,7 @@ fn line(argument: &str, weld: bool) -> Result<serde_json::Value, Box<dyn Error>>
     out.insert("file".to_owned(), argument.into());
     for (name, value) in table.values {
         let value = match value {
-            Value::Count(count) => count.into(),
+            Value::Count(count) | Value::AtLeast(count) => count.into(),
             Value::Integer(integer) => integer.into(),
             Value::Number(number) => number.into(),
             Value::Flag(flag) => flag.into(),

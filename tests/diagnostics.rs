@@ -85,3 +85,27 @@ fn a_wrong_argument_is_underlined_in_the_argument() {
         insta::assert_snapshot!("wrong-argument", report("tests/recipes/good.toml", &overrides));
     });
 }
+
+/// Recipes that no person writes: each name that is unknown is compared with all that are known.
+#[test]
+fn thousands_of_wrong_names_end_after_a_thousand() {
+    let head =
+        "[inputs]\npart = \"examples/meshes/l_bracket.stl\"\n[steps.raw]\nuse = \"read\"\nfile = \"=inputs.part\"\n";
+    let many = |line: &dyn Fn(usize) -> String| (0..20_000).map(line).collect::<String>();
+    let bodies = [
+        format!("[steps.c]\nuse = \"repair\"\nfrom = \"raw\"\n{}", many(&|i| format!("kez{i} = 1\n"))),
+        format!("[params]\n{}", many(&|i| format!("kez{i} = \"=b{i}\"\n"))),
+        format!("[params]\n{}", many(&|i| format!("kez{i} = 1\n"))),
+        format!("[gates.raw]\n{}", many(&|i| format!("kez{i} = 1\n"))),
+        many(&|i| format!("[steps.s{i}]\nuse = \"repair\"\nfrom = \"raww{i}\"\n")),
+    ];
+    for body in bodies {
+        let text = format!("{head}{body}");
+        let loader = |_: &Path| Ok(text.clone());
+        let recipe = Recipe::load(Path::new("many.toml"), &loader, &Overrides::default()).expect("it is TOML");
+        let context = Context { catalog: CATALOG, check_file: &|_| Ok(()), endings: &["stl"], second_order: &[] };
+        let found = plan(&recipe, &context).map(drop).expect_err("names are wrong");
+        assert!(found.stopped && found.list.len() == 1000, "{}", found.list.len());
+        assert!(found.render(false).ends_with("and 950 more problems; looking stopped after 1000"));
+    }
+}

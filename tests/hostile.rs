@@ -34,6 +34,20 @@ fn xml_that_is_deep_or_grows() {
 }
 
 #[test]
+fn xml_with_attributes_or_name_spaces_without_end() {
+    let many = |name: &str, count: usize| (0..count).map(|i| format!(" {name}{i}=\"1\"")).collect::<Vec<_>>().concat();
+    let error = refused(Format::Vtu, &vtu("3", &many("a", 200_000), "")).to_string();
+    assert!(error.contains("attributes"), "{error}");
+    let nested = (0..30_000).map(|i| format!("<a xmlns:n{i}=\"u{i}\">")).collect::<Vec<_>>().concat();
+    let error = refused(Format::Vtu, &vtu("3", "", &nested)).to_string();
+    assert!(error.contains("name spaces"), "{error}");
+    // Quotes and comments may hold what looks like attributes.
+    let signs = format!("<!-- {} -->", "= ".repeat(200));
+    let error = refused(Format::Vtu, &vtu("3", "", &signs)).to_string();
+    assert!(!error.contains("attributes"), "{error}");
+}
+
+#[test]
 fn compressed_data_that_grows_beyond_what_the_mesh_needs() {
     let mut packer = flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::best());
     for _ in 0..64 {

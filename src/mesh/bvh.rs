@@ -65,6 +65,18 @@ impl Primitive for Segment {
     }
 }
 
+impl Primitive for Aabb {
+    #[inline]
+    fn bounds(&self) -> Aabb {
+        *self
+    }
+    #[inline]
+    fn nearest(&self, p: DVec3) -> Nearest {
+        let point = p.clamp(self.min, self.max);
+        Nearest { point, weights: [0.0; 3], distance_squared: (p - point).length_squared() }
+    }
+}
+
 /// The primitive nearest to a query.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Closest {
@@ -198,14 +210,39 @@ impl<P: Primitive> Bvh<P> {
     }
 
     /// Calls `visit` with every primitive whose box meets `area`, until it breaks.
-    pub fn for_each_in(&self, area: &Aabb, mut visit: impl FnMut(u32, &P) -> ControlFlow<()>) -> ControlFlow<()> {
+    pub fn for_each_in(&self, area: &Aabb, visit: impl FnMut(u32, &P) -> ControlFlow<()>) -> ControlFlow<()> {
+        self.for_each_in_but(area, (&[], u32::MAX), visit)
+    }
+
+    /// For each node the label that all its primitives have, `u32::MAX` where they differ; for [`Self::for_each_in_but`].
+    pub fn labels(&self, of: impl Fn(u32) -> u32) -> Vec<u32> {
+        let mut labels = vec![u32::MAX; self.nodes.len()];
+        // Children have higher numbers than their node.
+        for (at, node) in self.nodes.iter().enumerate().rev() {
+            let first = node.first as usize;
+            let both = |a: u32, b: u32| if a == b { a } else { u32::MAX };
+            labels[at] = match node.count as usize {
+                0 => both(labels[first], labels[first + 1]),
+                count => self.indices[first..first + count].iter().map(|&i| of(i)).reduce(both).unwrap_or(u32::MAX),
+            };
+        }
+        labels
+    }
+
+    /// As [`Self::for_each_in`], but passes by nodes whose label is `own`; none where that is `u32::MAX`.
+    pub fn for_each_in_but(
+        &self,
+        area: &Aabb,
+        (labels, own): (&[u32], u32),
+        mut visit: impl FnMut(u32, &P) -> ControlFlow<()>,
+    ) -> ControlFlow<()> {
         let mut stack: Stack<u32> = Stack::new();
         if !self.nodes.is_empty() {
             stack.push(0);
         }
         while let Some(node) = stack.pop() {
             let Node { bounds, first, count } = self.nodes[node as usize];
-            if !bounds.overlaps(area) {
+            if !bounds.overlaps(area) || (own != u32::MAX && labels[node as usize] == own) {
                 continue;
             }
             if count == 0 {

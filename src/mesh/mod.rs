@@ -9,6 +9,7 @@ pub mod geometry;
 pub mod halfedge;
 pub mod hierarchy;
 pub mod id;
+pub mod meetings;
 pub mod patches;
 pub mod predicate;
 pub mod quads;

@@ -2,15 +2,12 @@
 //!
 //! Quads are cut on the shorter diagonal. Two faces count when they meet outside the corners and the edge that they
 //! share, where corners with equal coordinates are shared. Faces without area and duplicates are left to their own
-//! metrics. Candidates come from a hierarchy of boxes; every face asks for those with higher numbers, in parallel, so
-//! that the order of the answer is the order of faces.
-
-use std::ops::ControlFlow;
+//! metrics. Counting stops at [`MOST`] pairs, or where too many boxes overlap to look at each two; the answer says so.
 
 use glam::DVec3;
-use rayon::prelude::*;
 
-use crate::mesh::bvh::{Primitive, TriangleBvh};
+pub use crate::mesh::meetings::MOST;
+use crate::mesh::meetings::meetings;
 use crate::mesh::predicate::{Meeting, triangle_triangle};
 use crate::mesh::{FaceId, Facet, Soup, VertexId};
 use crate::watch::{Cancelled, Watch};
@@ -58,36 +55,25 @@ pub fn triangulated(mesh: &Soup) -> Triangulated {
     out
 }
 
-/// Pairs of faces that intersect, the smaller id first, in order.
-pub fn self_intersections(mesh: &Soup, watch: &Watch) -> Result<Vec<(FaceId, FaceId, Meeting)>, Cancelled> {
+/// Pairs of faces that intersect.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Intersections {
+    /// The pairs, the smaller id first, in order, and how they meet.
+    pub pairs: Vec<(FaceId, FaceId, Meeting)>,
+    /// Whether these are all; else there are at least as many.
+    pub complete: bool,
+}
+
+/// Pairs of faces that intersect.
+pub fn self_intersections(mesh: &Soup, watch: &Watch) -> Result<Intersections, Cancelled> {
     let cut = triangulated(mesh);
-    let (triangles, origin) = (cut.coordinates(mesh), cut.origin);
-    let bvh = TriangleBvh::new(triangles.clone());
-    let pairs: Vec<Vec<(FaceId, FaceId, Meeting)>> = (0..triangles.len())
-        .into_par_iter()
-        .map(|i| {
-            let mut found = Vec::new();
-            if i % 256 == 0 && watch.is_cancelled() {
-                return found;
-            }
-            let _ = bvh.for_each_in(&triangles[i].bounds(), |j, other| {
-                if j as usize > i && origin[i] != origin[j as usize] {
-                    let meeting = triangle_triangle(triangles[i], *other);
-                    if meeting.is_intersection() {
-                        found.push((origin[i], origin[j as usize], meeting));
-                    }
-                }
-                ControlFlow::Continue(())
-            });
-            found
-        })
-        .collect();
-    watch.check()?;
-    let mut pairs: Vec<_> = pairs.into_iter().flatten().collect();
+    let found = meetings(&cut.coordinates(mesh), triangle_triangle, watch)?;
+    let of = |(i, j, meeting): (u32, u32, Meeting)| (cut.origin[i as usize], cut.origin[j as usize], meeting);
+    let mut pairs: Vec<_> = found.pairs.into_iter().map(of).filter(|(a, b, _)| a != b).collect();
     pairs.sort_unstable();
     // The two halves of a quad may meet the same face.
     pairs.dedup_by_key(|p| (p.0, p.1));
-    Ok(pairs)
+    Ok(Intersections { pairs, complete: found.complete })
 }
 
 /// The faces of these pairs, in order.

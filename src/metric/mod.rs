@@ -36,6 +36,8 @@ pub struct Measurement {
 pub enum Value {
     /// A count.
     Count(u64),
+    /// A count that stopped here: there are as many or more.
+    AtLeast(u64),
     /// A signed integer, such as the Euler characteristic.
     Integer(i64),
     /// A number in its metric's unit.
@@ -59,7 +61,7 @@ impl Value {
     /// The value as a number; a flag is 1 or 0.
     pub fn as_f64(self) -> f64 {
         match self {
-            Self::Count(count) => count as f64,
+            Self::Count(count) | Self::AtLeast(count) => count as f64,
             Self::Integer(integer) => integer as f64,
             Self::Number(number) => number,
             Self::Flag(flag) => f64::from(u8::from(flag)),

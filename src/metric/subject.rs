@@ -6,14 +6,13 @@ use glam::DVec3;
 
 use super::distance::{self, Target, TwoSided};
 use super::feature::{FeatureDeviation, feature_deviation};
-use super::intersection::self_intersections;
+use super::intersection::{Intersections, self_intersections};
 use super::quad_layout::{Layout, layout_counts};
 use super::quad_shape::{QuadShapes, quad_shapes};
 use super::shape::{TriangleShapes, triangle_shapes};
 use super::summary;
 use super::topology::{Topology, topology};
 use crate::mesh::geometry::{Aabb, triangle_area};
-use crate::mesh::predicate::Meeting;
 use crate::mesh::{FaceId, Facet, Soup};
 use crate::watch::Watch;
 
@@ -38,7 +37,7 @@ pub struct Subject<'a> {
     triangles: OnceLock<TriangleShapes>,
     quads: OnceLock<QuadShapes>,
     layout: OnceLock<Layout>,
-    intersections: OnceLock<Vec<(FaceId, FaceId, Meeting)>>,
+    intersections: OnceLock<Intersections>,
     target: OnceLock<Target>,
     distance: OnceLock<Option<TwoSided>>,
     features: OnceLock<Option<FeatureDeviation>>,
@@ -117,7 +116,7 @@ impl<'a> Subject<'a> {
     }
 
     /// Pairs of faces that intersect. Empty when cancelled; ask the watch afterwards.
-    pub fn intersections(&self) -> &[(FaceId, FaceId, Meeting)] {
+    pub fn intersections(&self) -> &Intersections {
         self.intersections.get_or_init(|| self_intersections(self.mesh, self.watch).unwrap_or_default())
     }
 

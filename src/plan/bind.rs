@@ -13,7 +13,7 @@ use toml::de::{DeValue, ValueDeserializer};
 
 use super::case::CaseContext;
 use crate::recipe::suggest::{closest, did_you_mean};
-use crate::recipe::{Diagnostic, Entry, Node, Span, StepDecl, Table, normalize};
+use crate::recipe::{Diagnostic, Entry, Node, Span, StepDecl, Table, is_full, normalize};
 use crate::step::parameters::ParameterSchema;
 use crate::step::{BoundStep, Locks, Port, StepDef};
 
@@ -41,8 +41,11 @@ pub(super) struct Link {
     pub(super) span: Span,
 }
 
-/// Reads the table of a step; `None` when its kind is unknown.
+/// Reads the table of a step; `None` when its kind is unknown, or there are enough problems already.
 pub(super) fn bind<'r>(decl: &'r StepDecl, context: &mut CaseContext<'r>) -> Option<BoundDecl<'r>> {
+    if is_full(&context.problems) {
+        return None;
+    }
     let Some(def) = context.catalog.iter().find(|def| def.name == decl.kind) else {
         let help = did_you_mean(&decl.kind, "kinds of step", context.catalog.iter().map(|def| def.name));
         let message = format!("there is no kind of step `{}`", decl.kind);
@@ -160,6 +163,9 @@ fn check_keys(
         table.entries.keys().filter(|key| !schema.properties.contains_key(*key)).cloned().collect();
     for key in unknown {
         let Some(entry) = table.take(&key) else { continue };
+        if is_full(&context.problems) {
+            continue;
+        }
         let help = if LOCK_KEYS.contains(&key.as_str()) {
             Some(format!("`{}` changes nothing that could be kept", def.name))
         } else {

@@ -13,7 +13,7 @@ use super::outputs::{OutputDecl, outputs};
 use super::task::{GateTask, StepTask, TaskId};
 use super::wire::{Producer, Wiring, wire};
 use super::{Case, Column, Gate, Output, OutputOptions, Plan};
-use crate::recipe::{Diagnostic, Diagnostics, Recipe, Span, Value};
+use crate::recipe::{Diagnostic, Diagnostics, Recipe, Span, Value, is_full};
 use crate::step::OutputDef;
 
 /// Plans a recipe as it is.
@@ -43,7 +43,7 @@ pub fn plan_cases(
         state.scope.blame(&mut state.problems, &recipe.sources);
         problems.append(&mut state.problems);
         // The faults of the first wrong cases are enough to go on with.
-        if problems.len() > 1000 {
+        if is_full(&problems) {
             break;
         }
     }

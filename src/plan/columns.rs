@@ -13,7 +13,7 @@ use super::wire::{Producer, Wiring, producer};
 use crate::metric::gate::{Check, Limit};
 use crate::metric::registry::{METRICS, MetricDef, Needs, find};
 use crate::recipe::suggest::did_you_mean;
-use crate::recipe::{Diagnostic, Node, Span, Tree};
+use crate::recipe::{Diagnostic, Node, Span, Tree, is_full};
 use crate::step::Port;
 
 /// The keys of a column's table.
@@ -57,6 +57,9 @@ impl ColumnRequest {
         };
         let mut texts: BTreeMap<&str, (String, Span)> = BTreeMap::new();
         for (key, entry) in table.in_order() {
+            if is_full(problems) {
+                break;
+            }
             match &entry.value.value {
                 Node::Text(text) if COLUMN_KEYS.contains(&key) => {
                     texts.insert(key, (text.clone(), entry.value.span));
@@ -125,6 +128,9 @@ impl Columns<'_, '_> {
     }
 
     fn column(&self, request: &ColumnRequest, context: &mut CaseContext<'_>) -> Option<ColumnDecl> {
+        if is_full(&context.problems) {
+            return None;
+        }
         let (name, span) = &request.metric;
         let Some(metric) = find(name) else {
             let help = did_you_mean(name, "metrics", METRICS.iter().map(|metric| metric.name));

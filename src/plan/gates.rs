@@ -8,7 +8,7 @@ use super::wire::{Producer, Wiring, producer};
 use crate::metric::gate::{Check, Limit, judges_faces};
 use crate::metric::registry::{Direction, METRICS, MetricDef, Needs, Unit, find};
 use crate::recipe::suggest::did_you_mean;
-use crate::recipe::{Diagnostic, Entry, Node, Table, Tree};
+use crate::recipe::{Diagnostic, Entry, Node, Table, Tree, is_full};
 use crate::step::Port;
 
 /// The keys of a check.
@@ -63,6 +63,9 @@ pub(super) fn is_mesh(port: Port) -> bool {
 fn checks(table: &Table, steps: &[BoundDecl<'_>], wiring: &Wiring, context: &mut CaseContext<'_>) -> Vec<Group> {
     let mut groups: BTreeMap<Option<(usize, &str)>, Group> = BTreeMap::new();
     for (metric, entry) in &table.entries {
+        if is_full(&context.problems) {
+            break;
+        }
         let Some(metric) = known_metric(metric, entry, context) else { continue };
         let recipe = context.recipe;
         let Some(value) = context.scope.substitute(&entry.value, &recipe.sources, &mut context.problems) else {

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::bind::{BoundDecl, Link};
 use super::case::CaseContext;
 use crate::recipe::suggest::did_you_mean;
-use crate::recipe::{Diagnostic, Recipe, Span, order};
+use crate::recipe::{Diagnostic, Recipe, Span, is_full, order};
 use crate::step::{OutPort, OutputDef, Port, StepDef};
 
 /// An output of a step: the position of the step and the output's entry.
@@ -35,7 +35,7 @@ pub(super) fn producer(
 ) -> Option<Producer> {
     let (name, output) = target.split_once('.').unwrap_or((target, "main"));
     let Some(step) = context.places.get(name).copied() else {
-        if context.recipe.step(name).is_none() {
+        if !is_full(&context.problems) && context.recipe.step(name).is_none() {
             context.problems.push(unknown_step(target, name, span, context.recipe));
         }
         return None;

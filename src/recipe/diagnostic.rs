@@ -11,6 +11,10 @@ use crate::terminal::printable_lines;
 /// More than this many problems are counted, not shown; a reader mends the first ones and tries again.
 const SHOWN: usize = 50;
 
+/// After this many problems looking stops: a recipe with more was not written by a person, and each costs a search for
+/// what was meant.
+pub const MOST: usize = 1000;
+
 /// Longest part of a source line that is shown, in bytes.
 const LINE_WINDOW: usize = 400;
 
@@ -88,16 +92,25 @@ impl Diagnostic {
 pub struct Diagnostics {
     /// The texts.
     pub sources: Arc<SourceMap>,
-    /// The problems, in the order of their places.
+    /// The problems, in the order of their places, at most [`MOST`].
     pub list: Vec<Diagnostic>,
+    /// Whether looking stopped at [`MOST`], so that there may be more.
+    pub stopped: bool,
+}
+
+/// Whether there are so many problems that looking for more stops.
+pub fn is_full(problems: &[Diagnostic]) -> bool {
+    problems.len() >= MOST
 }
 
 impl Diagnostics {
-    /// Sorts the problems by place and drops repeated ones.
+    /// Sorts the first [`MOST`] problems by place and drops repeated ones.
     pub fn new(sources: Arc<SourceMap>, mut list: Vec<Diagnostic>) -> Self {
+        let stopped = is_full(&list);
+        list.truncate(MOST);
         list.sort_by_key(|d| d.labels.first().map(|label| label.span));
         list.dedup();
-        Self { sources, list }
+        Self { sources, list, stopped }
     }
 
     /// One report for a terminal, with colours where `styled`.
@@ -106,7 +119,9 @@ impl Diagnostics {
         let mut parts: Vec<String> =
             self.list.iter().take(SHOWN).map(|diagnostic| render_one(diagnostic, &self.sources, &renderer)).collect();
         if self.list.len() > SHOWN {
-            parts.push(format!("and {} more problems", self.list.len() - SHOWN));
+            let more = self.list.len() - SHOWN;
+            let end = if self.stopped { format!("; looking stopped after {MOST}") } else { String::new() };
+            parts.push(format!("and {more} more problems{end}"));
         }
         parts.join("\n\n")
     }

@@ -22,7 +22,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 pub use circle::{Order, order};
-pub use diagnostic::{Diagnostic, Diagnostics, Label, Severity};
+pub use diagnostic::{Diagnostic, Diagnostics, Label, Severity, is_full};
 pub use expression::Value;
 pub use load::{Loader, normalize};
 pub use scope::{Scope, node as node_of};
@@ -296,6 +296,9 @@ impl Parts {
 
     fn leftover(&mut self) {
         for (key, entry) in self.root.in_order() {
+            if is_full(&self.problems) {
+                break;
+            }
             let help = did_you_mean(key, "sections", SECTIONS);
             let problem = Diagnostic::error(entry.key, format!("a recipe has no section `{key}`")).help_opt(help);
             self.problems.push(problem);

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use super::circle;
-use super::diagnostic::{Diagnostic, Label};
+use super::diagnostic::{Diagnostic, Label, is_full};
 use super::expression::{self, Expression, ExpressionError, Value};
 use super::source::{SourceMap, Span};
 use super::suggest::did_you_mean;
@@ -56,6 +56,9 @@ impl Scope {
             problems.push(circle_problem(path, &names, params));
         }
         for index in found.sorted {
+            if is_full(problems) {
+                break;
+            }
             let Some((formula, text)) = &formulas[index] else { continue };
             match scope.evaluate(formula, *text, sources) {
                 Ok(value) => drop(scope.params.insert(names[index].to_owned(), Some(value))),
@@ -121,6 +124,9 @@ impl Scope {
     /// A value with every expression in it replaced by its value, at the place where it is written. `None` when one of
     /// them has no value; then `problems` says why, or has said so before.
     pub fn substitute(&self, tree: &Tree, sources: &SourceMap, problems: &mut Vec<Diagnostic>) -> Option<Tree> {
+        if is_full(problems) {
+            return None;
+        }
         let value = match &tree.value {
             Node::Text(text) if text.starts_with('=') => match plain(tree, sources) {
                 Ok(Plain::Value(Value::Text(text))) => Node::Text(text),

@@ -1,6 +1,10 @@
 //! What was probably meant by a misspelt name.
 
-/// The candidate closest to `name`, if it is close enough to be meant. Ties go to the first candidate.
+/// Names that one name is compared with; a person tells no more of them apart.
+const COMPARED: usize = 500;
+
+/// The candidate closest to `name`, if it is close enough to be meant. Ties go to the first candidate. Only the
+/// first 500 candidates are compared, so that the cost has a bound.
 pub fn closest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     // Names are short; a long one is an attack or an accident, and comparing it would be slow.
     if name.len() > 100 {
@@ -8,10 +12,8 @@ pub fn closest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) ->
     }
     let spelled = name.to_lowercase().replace('_', "-");
     let mut best: Option<(f64, &str)> = None;
-    for candidate in candidates {
-        if candidate.len() > 100 {
-            continue;
-        }
+    let fits = |candidate: &&str| candidate.len() <= 100;
+    for candidate in candidates.into_iter().filter(fits).take(COMPARED) {
         let likeness = strsim::normalized_damerau_levenshtein(&spelled, &candidate.to_lowercase());
         let shares_word = candidate.len() > 2
             && name.len() > 2

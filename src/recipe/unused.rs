@@ -4,7 +4,7 @@
 use std::collections::BTreeSet;
 
 use super::Recipe;
-use super::diagnostic::Diagnostic;
+use super::diagnostic::{Diagnostic, MOST};
 use super::expression;
 use super::suggest::did_you_mean;
 use super::tree::{Node, Table, Tree};
@@ -21,6 +21,7 @@ pub(super) fn unused(recipe: &Recipe) -> Vec<Diagnostic> {
     let of = |(name, _): &(&str, _)| !used.contains(*name);
     let params = recipe.params.in_order().into_iter().filter(of);
     params
+        .take(MOST)
         .map(|(name, entry)| {
             let help = did_you_mean(name, "the recipe uses", used.iter().map(String::as_str));
             Diagnostic::error(entry.key, format!("nothing uses the parameter `{name}`")).help_opt(help)

@@ -2,7 +2,7 @@
 //!
 //! A document is an object with `kind` (`run`, `measure`, `diff`, `mesh-diff` or `sweep`), `units`, which gives the unit of
 //! each metric in it that has one, and the content of that kind. Measured values are plain numbers and truth values; a
-//! number that is not finite is null. `schemas/output.schema.json`, which `meshmill schema output` prints, is the schema.
+//! number that is not finite is null; where counting stopped, the number is a lower bound and its unit `or more`. `schemas/output.schema.json`, which `meshmill schema output` prints, is the schema.
 
 use std::collections::BTreeMap;
 
@@ -55,6 +55,9 @@ pub fn document(kind: Kind, content: &impl Serialize) -> serde_json::Result<Json
     Ok(document.into())
 }
 
+/// What the program calls a count that stopped.
+const AT_LEAST: &str = "AtLeast";
+
 /// Puts values in the place of what the program calls them, and notes the units of the metrics met.
 fn flatten(json: &mut Json, units: &mut Map<String, Json>) {
     match json {
@@ -67,7 +70,12 @@ fn flatten(json: &mut Json, units: &mut Map<String, Json>) {
             if let Some(Json::String(metric)) = table.get("metric") {
                 note_unit(metric, units);
             }
+            let metric = table.get("metric").and_then(Json::as_str).map(str::to_owned);
             for (name, item) in table {
+                if item.get(AT_LEAST).is_some() {
+                    let name = metric.as_ref().filter(|_| name == "measured").unwrap_or(name);
+                    units.insert(name.clone(), "or more".into());
+                }
                 flatten(item, units);
                 if !item.is_object() && !item.is_array() {
                     note_unit(name, units);
@@ -83,7 +91,7 @@ fn bare_value(table: &Map<String, Json>) -> Option<Json> {
     let mut entries = table.iter();
     let (Some((name, value)), None) = (entries.next(), entries.next()) else { return None };
     let is_value = match name.as_str() {
-        "Count" | "Integer" => value.is_i64() || value.is_u64(),
+        "Count" | "Integer" | AT_LEAST => value.is_i64() || value.is_u64(),
         "Number" => value.is_number() || value.is_null(),
         "Flag" => value.is_boolean(),
         _ => false,
@@ -119,9 +127,10 @@ pub fn schema() -> Json {
     };
     let documents: Vec<Json> = contents.into_iter().map(envelope).collect();
     let mut definitions = generator.take_definitions(true);
-    let unit = json!({ "enum": ["length", "area", "volume", "degrees", "share"] });
+    let unit = json!({ "enum": ["length", "area", "volume", "degrees", "share", "or more"] });
     definitions.insert("Units".to_owned(), json!({
-        "description": "The unit of each metric of the document that has one. Lengths are in the units of the mesh.",
+        "description": "The unit of each metric of the document that has one. Lengths are in the units of the mesh. Counts \
+            with `or more` are lower bounds: counting stopped there.",
         "type": "object",
         "additionalProperties": unit
     }));
@@ -151,12 +160,16 @@ mod tests {
             ("area", Value::Number(6.5)),
             ("min-edge", Value::Number(f64::NAN)),
             ("euler-characteristic", Value::Integer(-2)),
+            ("self-intersections", Value::AtLeast(1_000_000)),
         ];
         let metrics = values.map(|(name, value)| (name.to_owned(), value)).into();
         let expected = json!({
             "kind": "measure",
-            "metrics": { "area": 6.5, "closed": true, "euler-characteristic": -2, "faces": 12, "min-edge": null },
-            "units": { "area": "area", "min-edge": "length" },
+            "metrics": {
+                "area": 6.5, "closed": true, "euler-characteristic": -2, "faces": 12, "min-edge": null,
+                "self-intersections": 1_000_000,
+            },
+            "units": { "area": "area", "min-edge": "length", "self-intersections": "or more" },
         });
         assert_eq!(document(Kind::Measure, &Measured { metrics }).unwrap(), expected);
     }

@@ -19,6 +19,7 @@ pub fn rows(measurement: &Measurement) -> Vec<[String; 3]> {
 pub fn value_text(value: &Value) -> String {
     match value {
         Value::Count(count) => count.to_string(),
+        Value::AtLeast(count) => format!("≥ {count}"),
         Value::Integer(number) => number.to_string(),
         Value::Number(number) => number_text(*number),
         Value::Flag(flag) => if *flag { "yes" } else { "no" }.to_owned(),

@@ -181,6 +181,7 @@ impl RowState {
 fn exact(value: Value) -> String {
     match value {
         Value::Count(count) => count.to_string(),
+        Value::AtLeast(count) => format!("≥ {count}"),
         Value::Integer(number) => number.to_string(),
         Value::Number(number) => number.to_string(),
         Value::Flag(flag) => flag.to_string(),

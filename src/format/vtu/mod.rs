@@ -47,6 +47,10 @@ pub(super) const DEF_POLYGONAL: FormatDef = FormatDef {
 };
 
 const MOST_NODES: u32 = 1 << 16;
+/// Attributes of one element. The parser compares each with all others of its element, and VTK writes a dozen.
+const MOST_ATTRIBUTES: usize = 256;
+/// Declarations of name spaces in a file, which the parser copies into every element below; VTK writes none.
+const MOST_NAME_SPACES: usize = 64;
 
 fn is_grid(bytes: &[u8]) -> bool {
     begins_with(bytes, b"<VTKFile") && !is_polygonal(bytes)
@@ -63,6 +67,7 @@ fn begins_with(bytes: &[u8], word: &[u8]) -> bool {
 
 fn read(bytes: &[u8], watch: &Watch) -> Result<(Soup, ReadCounts), FormatError> {
     let (text, appended) = split_appended(bytes)?;
+    bounded(&text)?;
     let options = ParsingOptions { nodes_limit: MOST_NODES, ..ParsingOptions::default() };
     let document = Document::parse_with_options(&text, options).map_err(|e| not_xml(&e))?;
     let root = document.root_element();
@@ -107,6 +112,31 @@ fn split_appended(bytes: &[u8]) -> Result<(Cow<'_, str>, Option<Appended>), Form
     let mark = bytes[close..].iter().position(|&b| b == b'_').ok_or_else(within("appended data"))? + close;
     let closed = format!("{}/></VTKFile>", head.trim_end_matches('/'));
     Ok((closed.into(), Some(Appended { start: mark + 1, base64 })))
+}
+
+/// Refuses what the parser takes more than linear time for.
+fn bounded(text: &str) -> Result<(), FormatError> {
+    let too_many = |at: usize, what, limit: usize| {
+        Err(FormatError::new(Place::Byte(at as u64), Reason::TooMany { what, limit: limit as u64 }))
+    };
+    let (mut quote, mut is_tag, mut attributes) = (None, false, 0);
+    for (at, byte) in text.bytes().enumerate() {
+        match (byte, quote) {
+            (b'"' | b'\'', None) if is_tag => quote = Some(byte),
+            (_, Some(open)) if byte == open => quote = None,
+            (b'<', None) => (is_tag, attributes) = (true, 0),
+            (b'>', None) => is_tag = false,
+            (b'=', None) if is_tag => attributes += 1,
+            _ => {}
+        }
+        if attributes > MOST_ATTRIBUTES {
+            return too_many(at, "attributes of one XML element", MOST_ATTRIBUTES);
+        }
+    }
+    if text.matches("xmlns").nth(MOST_NAME_SPACES).is_some() {
+        return too_many(0, "XML name spaces", MOST_NAME_SPACES);
+    }
+    Ok(())
 }
 
 fn not_xml(error: &roxmltree::Error) -> FormatError {

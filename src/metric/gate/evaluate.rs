@@ -26,6 +26,9 @@ pub enum GateError {
 /// Computed lengths differ in the last digits from lengths that a step was given: both count as equal.
 const ROUNDING: f64 = 1e-9;
 
+/// Why a check of a count that stopped fails.
+const UNKNOWN: &str = "counting stopped at this many, so that nobody can say whether the check holds: it fails";
+
 /// A check with its bounds as numbers.
 struct Bounds {
     at_least: Option<f64>,
@@ -119,9 +122,11 @@ fn resolve(subject: &Subject<'_>, metric: &MetricDef, check: &Check) -> Bounds {
     let at_least = number("at least", check.at_least);
     let mut at_most = number("at most", check.at_most);
     let mut equals = number("", check.equals);
-    let theirs = subject.reference().and_then(|r| (metric.measure)(r)).map(Value::as_f64);
+    let theirs = subject.reference().and_then(|r| (metric.measure)(r));
+    let is_lower_bound = matches!(theirs, Some(Value::AtLeast(_)));
+    let theirs = theirs.map(Value::as_f64);
     if check.same_as_reference && metric.needs != Needs::Reference {
-        equals = Some(theirs.unwrap_or(f64::NAN));
+        equals = Some(theirs.filter(|_| !is_lower_bound).unwrap_or(f64::NAN));
         words.push(format!(
             "the same as the reference{}",
             theirs.map_or(String::new(), |v| format!(" = {}", number_text(v)))
@@ -130,7 +135,8 @@ fn resolve(subject: &Subject<'_>, metric: &MetricDef, check: &Check) -> Bounds {
     if check.no_more_than_reference && metric.needs != Needs::Reference {
         let theirs = theirs.unwrap_or(f64::NAN);
         at_most = Some(at_most.map_or(theirs, |b| b.min(theirs)));
-        words.push(format!("no more than the reference = {}", number_text(theirs)));
+        let relation = if is_lower_bound { "≥" } else { "=" };
+        words.push(format!("no more than the reference {relation} {}", number_text(theirs)));
     }
     Bounds { at_least, at_most, equals, text: words.join(", ") }
 }
@@ -234,10 +240,17 @@ fn judge_whole(subject: &Subject<'_>, metric: &MetricDef, bounds: &Bounds) -> Ga
     // A check without a bound only measures.
     out.passed = value.map_or(nothing || bounds.is_empty(), |v| bounds.admits(v));
     out.slack = value.and_then(|v| bounds.slack(v)).filter(|_| metric.unit != Unit::Flag);
+    let stopped = |value: Option<Value>| matches!(value, Some(Value::AtLeast(_)));
+    // A lower bound decides nothing that needs the count.
+    let is_unknown = stopped(out.measured) && !bounds.is_empty();
+    out.passed &= !is_unknown;
+    out.slack = out.slack.filter(|_| !is_unknown);
     if nothing {
         out.note = Some("there is no element to judge".to_owned());
     } else if out.measured.is_none() {
         out.note = Some("undefined on this mesh".to_owned());
+    } else if is_unknown {
+        out.note = Some(UNKNOWN.to_owned());
     }
     if !out.passed {
         (out.fault_count, out.faults) = worst(fault::of_whole(subject, metric.name), |v| v);

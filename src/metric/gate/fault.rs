@@ -39,7 +39,7 @@ pub(super) fn of_whole(subject: &Subject<'_>, name: &str) -> Vec<Fault> {
         "duplicate-faces" => faces(topology.duplicates.clone()),
         "repeated-vertex-faces" => faces(topology.repeated.clone()),
         "degenerate-faces" => faces(subject.degenerate()),
-        "self-intersections" | "self-intersecting-faces" => faces(faces_of(subject.intersections())),
+        "self-intersections" | "self-intersecting-faces" => faces(faces_of(&subject.intersections().pairs)),
         "irregular-vertices" | "irregular-share" => {
             vertices(&mut subject.inner_and_irregular().1.into_iter().map(|v| v as u32))
         }

@@ -156,3 +156,21 @@ fn without_an_element_nothing_fails_but_an_unknown_metric_does() {
         Err(GateError::UnknownMetric("no-such".to_owned()))
     );
 }
+
+#[test]
+fn a_check_of_a_count_that_stopped_fails_and_says_so() {
+    // Triangles in one plane, each over all others: more pairs than are counted.
+    let count = 1500;
+    let at = |i: u32| f64::from(i) / 1e4;
+    let points =
+        (0..count).flat_map(|i| [dvec3(at(i), 0.0, 0.0), dvec3(1.0 + at(i), 0.0, 0.0), dvec3(at(i), 1.0, 0.0)]);
+    let face = |i: u32| Facet::Tri([3 * i, 3 * i + 1, 3 * i + 2].map(VertexId::from_raw));
+    let mesh =
+        Soup { points: points.collect::<Vec<_>>().into(), faces: (0..count).map(face).collect(), ..Soup::default() };
+    let limit = Some(Limit::Number(1e9));
+    let row = one(&mesh, None, Check { at_most: limit, ..check("self-intersections") });
+    assert_eq!((row.passed, row.measured), (false, Some(Value::AtLeast(1_000_000))));
+    assert!(row.note.as_deref().is_some_and(|note| note.contains("counting stopped")), "{:?}", row.note);
+    let same = one(&mesh, Some(&mesh), Check { no_more_than_reference: true, ..check("self-intersections") });
+    assert!(!same.passed && same.limit.contains('≥'), "{}", same.limit);
+}

@@ -25,6 +25,11 @@ fn share(part: usize, whole: usize) -> Option<f64> {
     (whole > 0).then(|| part as f64 / whole as f64)
 }
 
+/// A count of what meets, which is a lower bound where counting stopped.
+fn crossings(s: &Subject<'_>, found: usize) -> Option<Value> {
+    if s.intersections().complete { count(found) } else { Some(Value::AtLeast(found as u64)) }
+}
+
 pub(super) static METRICS: &[MetricDef] = &[
     metric("vertices", Count, Neutral, Mesh, "Vertices that a face uses.", |s| count(s.topology().vertices)),
     metric("faces", Count, Neutral, Mesh, "Triangles and quads.", |s| count(s.mesh().faces.len())),
@@ -109,9 +114,16 @@ pub(super) static METRICS: &[MetricDef] = &[
         Lower,
         Mesh,
         "Faces that meet another one outside what they share, decided exactly; quads cut on the shorter diagonal.",
-        |s| count(faces_of(s.intersections()).len()),
+        |s| crossings(s, faces_of(&s.intersections().pairs).len()),
     ),
-    metric("self-intersections", Count, Lower, Mesh, "Pairs of such faces.", |s| count(s.intersections().len())),
+    metric(
+        "self-intersections",
+        Count,
+        Lower,
+        Mesh,
+        "Pairs of such faces; counting stops at a million, or where too many boxes overlap, and says so with ≥.",
+        |s| crossings(s, s.intersections().pairs.len()),
+    ),
     metric("area", Area, Neutral, Mesh, "Sum of face areas; a quad is the mean of its two cuts.", |s| {
         number(Some(s.extent().area))
     }),

@@ -11,7 +11,7 @@ use std::path::PathBuf;
 
 use super::{LARGEST, Reader};
 use crate::recipe::suggest::did_you_mean;
-use crate::recipe::{Diagnostic, Entry, Node, Span, Table, Tree, Value, node_of};
+use crate::recipe::{Diagnostic, Entry, Node, Span, Table, Tree, Value, is_full, node_of};
 
 /// The keys of a range.
 pub(super) const RANGE_KEYS: [&str; 4] = ["from", "to", "count", "scale"];
@@ -122,8 +122,12 @@ impl Reader<'_> {
         axes
     }
 
-    /// What a name in a sweep means: itself for a parameter, `inputs.NAME` for an input.
+    /// What a name in a sweep means: itself for a parameter, `inputs.NAME` for an input; nothing where there are
+    /// enough problems already.
     pub(super) fn target(&mut self, name: &str, span: Span) -> Option<String> {
+        if is_full(&self.problems) {
+            return None;
+        }
         let recipe = self.recipe;
         let input = name.strip_prefix("inputs.");
         if input.is_none() && recipe.params.get(name).is_some() {

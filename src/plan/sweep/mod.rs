@@ -38,7 +38,7 @@ use name::Names;
 use super::case::CaseSpec;
 use super::columns::ColumnRequest;
 use crate::recipe::suggest::did_you_mean;
-use crate::recipe::{Diagnostic, Diagnostics, Entry, Node, Recipe, Span, Table, Tree};
+use crate::recipe::{Diagnostic, Diagnostics, Entry, Node, Recipe, Span, Table, Tree, is_full};
 
 /// The keys of the section.
 pub const SWEEP_KEYS: [&str; 5] = ["axes", "zip", "case", "sample", "columns"];
@@ -101,7 +101,7 @@ impl<'a> Reader<'a> {
 
     fn known_keys(&mut self, table: &Table, what: &str, keys: &[&str]) {
         for (key, entry) in table.in_order() {
-            if !keys.contains(&key) {
+            if !keys.contains(&key) && !is_full(&self.problems) {
                 let help = did_you_mean(key, "keys", keys.iter().copied());
                 self.problem(Diagnostic::error(entry.key, format!("{what} has no key `{key}`")).help_opt(help));
             }

@@ -48,6 +48,7 @@ pub(super) fn digits(number: f64, count: i32) -> String {
 pub(super) fn value(value: &Value, unit: Unit) -> String {
     match (value, unit) {
         (Value::Count(count), _) => grouped(*count),
+        (Value::AtLeast(count), _) => format!("≥ {}", grouped(*count)),
         (Value::Integer(number), _) => number.to_string().replace('-', "−"),
         (Value::Number(number), Unit::Share) => format!("{} %", short(100.0 * number)),
         (Value::Number(number), _) => digits(*number, 4),

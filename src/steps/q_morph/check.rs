@@ -78,7 +78,7 @@ impl Check {
         let surface = ground.surface;
         let corners = SegmentBvh::new(surface.points.iter().map(|&p| [p, p]).collect());
         let soup = surface.to_soup();
-        let is_simple = self_intersections(&soup, watch)?.is_empty();
+        let is_simple = self_intersections(&soup, watch)?.pairs.is_empty();
         Ok(Self {
             surface: Target::of(&soup),
             corners,
@@ -136,8 +136,8 @@ impl Check {
         if !self.is_simple {
             return Ok(Vec::new());
         }
-        let pairs = self_intersections(&mesh.soup_of(faces), watch)?;
-        Ok(faces_of(&pairs).into_iter().map(|f| faces[f.index()]).collect())
+        let found = self_intersections(&mesh.soup_of(faces), watch)?;
+        Ok(faces_of(&found.pairs).into_iter().map(|f| faces[f.index()]).collect())
     }
 
     /// The places where the mesh and the surface are farther apart than `tolerance`, by a witness in each face at fault,

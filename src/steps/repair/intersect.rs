@@ -3,14 +3,13 @@
 //! Nearly all pairs whose boxes meet are neighbours, for which exact predicates are slowest because their answers are
 //! zero: these are first tried with tests in plain arithmetic that may only say "apart for certain".
 
-use std::ops::ControlFlow;
-
 use glam::DVec3;
 
 use super::draft::normal;
 use crate::mesh::FaceId;
-use crate::mesh::bvh::TriangleBvh;
-use crate::mesh::predicate::triangle_triangle;
+use crate::mesh::meetings::meetings;
+use crate::mesh::predicate::{Meeting, triangle_triangle};
+use crate::watch::{Cancelled, Watch};
 
 /// How many faces are listed.
 const LISTED: usize = 20;
@@ -22,26 +21,24 @@ pub(super) struct Intersections {
     pub(super) pairs: u64,
     /// The lowest faces among them, ascending.
     pub(super) faces: Vec<u32>,
+    /// Whether these are all pairs; else there are at least as many.
+    pub(super) complete: bool,
 }
 
-/// Counts the pairs.
-pub(super) fn self_intersections(count: usize, corners: impl Fn(FaceId) -> [DVec3; 3]) -> Intersections {
-    let bvh = TriangleBvh::new((0..count).map(|f| corners(FaceId::new(f))).collect());
-    let mut found = Intersections::default();
-    let mut faces = std::collections::BTreeSet::new();
-    let _ = bvh.for_each_self_pair(|i, j| {
-        let [a, b] = [i, j].map(|f| corners(FaceId::from_raw(f)));
-        if !is_surely_apart(a, b) && triangle_triangle(a, b).is_intersection() {
-            found.pairs += 1;
-            faces.extend([i, j]);
-            if faces.len() > 2 * LISTED {
-                faces = faces.iter().copied().take(LISTED).collect();
-            }
-        }
-        ControlFlow::Continue(())
-    });
-    found.faces = faces.into_iter().take(LISTED).collect();
-    found
+/// Counts the pairs, as far as [`meetings`] goes.
+pub(super) fn self_intersections(
+    count: usize,
+    corners: impl Fn(FaceId) -> [DVec3; 3],
+    watch: &Watch,
+) -> Result<Intersections, Cancelled> {
+    let triangles: Vec<[DVec3; 3]> = (0..count).map(|f| corners(FaceId::new(f))).collect();
+    let test = |a, b| if is_surely_apart(a, b) { Meeting::Disjoint } else { triangle_triangle(a, b) };
+    let found = meetings(&triangles, test, watch)?;
+    let mut faces: Vec<u32> = found.pairs.iter().flat_map(|&(i, j, _)| [i, j]).collect();
+    faces.sort_unstable();
+    faces.dedup();
+    faces.truncate(LISTED);
+    Ok(Intersections { pairs: found.pairs.len() as u64, faces, complete: found.complete })
 }
 
 /// A sign of plain arithmetic counts beyond this share of the magnitudes; rounding stays some thousand times below.

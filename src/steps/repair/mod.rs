@@ -77,7 +77,7 @@ pub fn repair(soup: &Soup, params: &RepairParams, watch: &Watch) -> Result<(Surf
         surface = again;
     }
     watch.check()?;
-    count_intersections(&surface, soup, &mut stats);
+    count_intersections(&surface, soup, &mut stats, watch)?;
     Ok((surface, stats))
 }
 
@@ -275,19 +275,28 @@ fn check_result(draft: &Draft, stats: &RepairStats, limit: f64) -> Result<(), Re
 }
 
 /// Counts faces that run through each other, before and after; where nothing was changed, once.
-fn count_intersections(surface: &Surface, soup: &Soup, stats: &mut RepairStats) {
-    let after = intersect::self_intersections(surface.faces.len(), |f| surface.corners(f));
+fn count_intersections(
+    surface: &Surface,
+    soup: &Soup,
+    stats: &mut RepairStats,
+    watch: &Watch,
+) -> Result<(), RepairError> {
+    let after = intersect::self_intersections(surface.faces.len(), |f| surface.corners(f), watch)?;
     let changes = stats.vertices_welded + stats.t_junctions + stats.edges_collapsed + stats.edges_flipped;
     let dropped = stats.repeated_faces + stats.cancelled_faces + stats.slivers_dropped + stats.components_dropped;
     let added = stats.faces_filled + stats.double_edges_split;
-    stats.self_intersections_before = if changes + dropped + added == 0 {
-        after.pairs
+    let before = if changes + dropped + added == 0 {
+        None
     } else {
         let mut input = draft::triangulate_and_weld_exactly(soup);
         duplicate::drop_collapsed(&mut input);
-        intersect::self_intersections(input.faces.len(), |f| input.corners(f)).pairs
+        Some(intersect::self_intersections(input.faces.len(), |f| input.corners(f), watch)?)
     };
+    let before = before.as_ref().unwrap_or(&after);
+    stats.self_intersections_before = before.pairs;
+    stats.counting_stopped = !(before.complete && after.complete);
     (stats.self_intersections, stats.self_intersecting_faces) = (after.pairs, after.faces);
+    Ok(())
 }
 
 /// The room's entry in the catalog.

@@ -79,6 +79,9 @@ pub struct RepairStats {
     pub self_intersections_before: u64,
     /// Pairs of faces that run through or touch each other in the result.
     pub self_intersections: u64,
+    /// Whether there were more pairs than are counted, so that the counts are lower bounds.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub counting_stopped: bool,
     /// The first faces of the result that run through others.
     pub self_intersecting_faces: Vec<u32>,
     /// How far the surface may have moved outside filled holes at most: a bound, in mesh units.
