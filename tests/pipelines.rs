@@ -130,6 +130,43 @@ fn looking_and_repairing_take_every_small_part_of_the_corpus() {
     }
 }
 
+/// What a run of a recipe on a part came to, which must be a result or a reason; all that it told.
+fn ends(recipe: &Path, part: &Path) -> String {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut command = assert_cmd::Command::new(assert_cmd::cargo::cargo_bin!("meshmill"));
+    command.current_dir(folder.path()).env("MESHMILL_CACHE", folder.path().join("cache"));
+    command.arg("run").arg(recipe).args(["--out", "out"]).arg("--input");
+    let done = command.arg(format!("part={}", part.display())).assert();
+    let output = done.get_output();
+    let [told, shown] = [&output.stderr, &output.stdout].map(|bytes| String::from_utf8_lossy(bytes).into_owned());
+    let name = format!("{} in {}", part.display(), recipe.display());
+    let code = output.status.code();
+    assert!(matches!(code, Some(0 | 2 | 3 | 4)), "{name}: {code:?}\n{told}");
+    assert!(code == Some(0) || [&told, &shown].iter().any(|text| text.contains("FAILED")), "{name}: {told}{shown}");
+    told + &shown
+}
+
+fn files_of(folder: &str) -> Vec<PathBuf> {
+    let entries = fs::read_dir(root().join(folder)).expect("the folder");
+    let mut files: Vec<_> = entries.map(|entry| entry.expect("an entry").path()).collect();
+    files.sort();
+    assert!(!files.is_empty());
+    files
+}
+
+/// Soups whose faces run through each other, faces on one line, coordinates that arithmetic cannot hold: each formerly
+/// kept some pipeline at work without end.
+#[test]
+fn nasty_meshes_end_in_every_pipeline_with_a_result_or_a_reason() {
+    for part in files_of("tests/nasty") {
+        for recipe in pipelines() {
+            let told = ends(&recipe, &part);
+            let wrong = ["NaN", "18446744073709551615"].into_iter().find(|wrong| told.contains(wrong));
+            assert_eq!(wrong, None, "{} in {}: {told}", part.display(), recipe.display());
+        }
+    }
+}
+
 /// Edges as pairs of vertices with the number of faces there.
 fn edges(mesh: &Soup) -> Vec<([usize; 2], usize)> {
     let sides = mesh.faces.iter().flat_map(|face| {

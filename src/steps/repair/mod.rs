@@ -63,6 +63,7 @@ use crate::watch::Watch;
 /// [`RepairError`]: nothing to repair, nothing left of it, or a corner that is not there.
 pub fn repair(soup: &Soup, params: &RepairParams, watch: &Watch) -> Result<(Surface, RepairStats), RepairError> {
     let diagonal = check_input(soup)?;
+    check_arithmetic(soup, diagonal)?;
     let limit = params.max_move.unwrap_or(params.weld).resolve(diagonal);
     let tolerance = params.weld.resolve(diagonal).min(limit);
     let (mut surface, mut stats) = repair_once(soup, params, tolerance, limit, watch)?;
@@ -77,7 +78,11 @@ pub fn repair(soup: &Soup, params: &RepairParams, watch: &Watch) -> Result<(Surf
         surface = again;
     }
     watch.check()?;
-    count_intersections(&surface, soup, &mut stats, watch)?;
+    if stats.degenerate_faces_left as usize == surface.faces.len() {
+        return Err(RepairError::NoArea { faces: surface.faces.len() });
+    }
+    let crossing_size = params.crossing_size.map(|size| size.resolve(diagonal));
+    count_intersections(&surface, soup, crossing_size, &mut stats, watch)?;
     Ok((surface, stats))
 }
 
@@ -116,6 +121,18 @@ fn check_input(soup: &Soup) -> Result<f64, RepairError> {
         }
     }
     if soup.faces.is_empty() { Err(RepairError::Empty) } else { Ok((high - low).length()) }
+}
+
+/// Whether computing keeps the shape.
+fn check_arithmetic(soup: &Soup, extent: f64) -> Result<(), RepairError> {
+    let used = soup.faces.iter().flat_map(|facet| facet.corners().iter().filter_map(|&v| soup.points.get(v)));
+    let offset = used.fold(0.0, |most: f64, p| most.max(p.abs().max_element()));
+    // One point alone is judged as a face without area.
+    let is_held = extent == 0.0 || (report::SMALLEST..=report::LARGEST).contains(&extent);
+    if is_held && (extent == 0.0 || offset <= report::FARTHEST * extent) {
+        return Ok(());
+    }
+    Err(RepairError::BeyondArithmetic { extent, offset })
 }
 
 /// Triangles that share vertices wherever they touch.
@@ -278,10 +295,14 @@ fn check_result(draft: &Draft, stats: &RepairStats, limit: f64) -> Result<(), Re
 fn count_intersections(
     surface: &Surface,
     soup: &Soup,
+    crossing_size: Option<f64>,
     stats: &mut RepairStats,
     watch: &Watch,
 ) -> Result<(), RepairError> {
     let after = intersect::self_intersections(surface.faces.len(), |f| surface.corners(f), watch)?;
+    if let Some(size) = crossing_size {
+        after.spread(size, |f| surface.corners(f))?;
+    }
     let changes = stats.vertices_welded + stats.t_junctions + stats.edges_collapsed + stats.edges_flipped;
     let dropped = stats.repeated_faces + stats.cancelled_faces + stats.slivers_dropped + stats.components_dropped;
     let added = stats.faces_filled + stats.double_edges_split;

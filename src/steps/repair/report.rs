@@ -163,6 +163,13 @@ pub struct ComponentStats {
     pub kept: bool,
 }
 
+/// Diagonals between which no product of six lengths that a step computes leaves the range of floats.
+pub(super) const SMALLEST: f64 = 1e-30;
+/// See [`SMALLEST`].
+pub(super) const LARGEST: f64 = 1e30;
+/// How many times its extent a part may lie away: beyond, coordinates have less than six digits for its shape.
+pub(super) const FARTHEST: f64 = 1e9;
+
 /// Why repair gave no surface.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RepairError {
@@ -179,6 +186,40 @@ pub enum RepairError {
         collapsed: u64,
         /// Faces of components that `keep-components` dropped.
         dropped: u64,
+    },
+    /// Every face that is left is degenerate.
+    #[error("none of the {faces} faces has an area: all their corners lie on one line, or nearly so")]
+    NoArea {
+        /// Faces left.
+        faces: usize,
+    },
+    /// Coordinates that products of lengths would overflow or underflow with, or that are too coarse for the shape.
+    #[error(
+        "the part has an extent of {extent:e} and lies {offset:e} from the origin: computing with that loses its shape \
+         (extents from {SMALLEST:e} to {LARGEST:e} can be held, and offsets of up to {FARTHEST:e} times the extent)"
+    )]
+    BeyondArithmetic {
+        /// The diagonal of the bounding box.
+        extent: f64,
+        /// The largest coordinate.
+        offset: f64,
+    },
+    /// Bodies run through each other.
+    #[error(
+        "faces run through each other in {pairs} places, along {length:.3e} in all: elements with edges of {size:.3e} would do \
+         so in about {expected} places, so that no gate against new intersections can pass"
+    )]
+    RunsThrough {
+        /// Pairs of faces.
+        pairs: u64,
+        /// Length of all intersections.
+        length: f64,
+        /// The edge length asked for.
+        size: f64,
+        /// Pairs of such elements.
+        expected: u64,
+        /// The faces that meet along the longest lines, and the middle of these.
+        worst: Vec<(u32, DVec3)>,
     },
     /// A corner names a vertex that does not exist, or a coordinate is not finite.
     #[error("face {face} has a corner that is missing or not finite")]
@@ -212,6 +253,18 @@ impl From<RepairError> for StepFailure {
             RepairError::Cancelled(cancelled) => cancelled.into(),
             RepairError::Empty => Self::bad_input(message).with_help("name a file that holds triangles or quads"),
             RepairError::NothingLeft { .. } => Self::failed(message).with_help("reduce `weld`, or keep all components"),
+            RepairError::NoArea { .. } => {
+                Self::failed(message).with_help("look at the file in a viewer: it may hold curves written as faces")
+            }
+            RepairError::BeyondArithmetic { .. } => {
+                Self::bad_input(message).with_help("move the part to the origin, and write it in another unit of length")
+            }
+            RepairError::RunsThrough { worst, .. } => Self::failed(message)
+                .with_help(
+                    "join the bodies in the program that made them, or mesh each by itself; \
+                     `crossing-size` = \"100%\" lets them through as they are",
+                )
+                .with_elements(worst.into_iter().map(|(f, at)| element(FaceId::from_raw(f), Some(at))).collect()),
             RepairError::BadFace { face } => Self::bad_input(message).with_elements(vec![element(face, None)]),
             RepairError::MovedTooFar { .. } => Self::failed(message).with_help("reduce `weld`, or raise `max-move`"),
             RepairError::NotManifold { face, at } => Self::failed(message)
