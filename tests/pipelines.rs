@@ -167,6 +167,16 @@ fn nasty_meshes_end_in_every_pipeline_with_a_result_or_a_reason() {
     }
 }
 
+/// A rod a thousand times as long as thick, a plate with a tiny hole, a feather edge, a coarse prism.
+#[test]
+fn extreme_parts_end_with_a_result_or_a_reason() {
+    for part in files_of("tests/geometry") {
+        for recipe in ["fe-surface", "quads-closed"] {
+            ends(&root().join(format!("pipelines/{recipe}.toml")), &part);
+        }
+    }
+}
+
 /// Edges as pairs of vertices with the number of faces there.
 fn edges(mesh: &Soup) -> Vec<([usize; 2], usize)> {
     let sides = mesh.faces.iter().flat_map(|face| {

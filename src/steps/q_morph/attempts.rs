@@ -5,10 +5,11 @@
 //! attempts then. For the others all begins again with whole regions only: larger steps, that lead elsewhere. Pieces
 //! are for what is left then.
 
-use std::cell::Cell;
+use std::cell::{Cell, OnceCell};
 
 use rustc_hash::FxHashSet;
 
+use super::budget::{self, Budget};
 use super::check::{Check, Fault, Wish, mean_side, smaller};
 use super::flatten::flatten;
 use super::lack::lack;
@@ -49,14 +50,14 @@ pub(super) fn morph(
     let stats = QMorphStats { regions, left_out: ground.left_out, attempts: 1, ..QMorphStats::default() };
     let check = Check::new(ground, watch)?;
     let left = Cell::new(2 * params.attempts);
-    let work = Morpher { ground, params, check: &check, scale, watch, left };
+    let work = Morpher { ground, params, check: &check, scale, watch, left, budget: OnceCell::new() };
     let mut begun = Vec::new();
     let Some(mut best) = work.attempts(rules, &stats, &mut begun)? else { return Err(QMorphError::Empty) };
     // Many pieces on a curve that is rough may be what broke it: none shorter than the least size, then a looser curve.
     let longer = Rules { shortest: rules.least_size, ..rules };
     let looser = Rules { curve_tolerance: LOOSER * rules.curve_tolerance, ..longer };
     for rules in [longer, looser] {
-        if best.lack < BROKEN || params.attempts <= 1 || ground.curves.is_empty() {
+        if best.lack < BROKEN || params.attempts <= 1 || ground.curves.is_empty() || work.is_spent() {
             break;
         }
         work.left.set(params.attempts);
@@ -74,6 +75,7 @@ pub(super) fn morph(
     let Attempt { quads, mut stats, .. } = best;
     stats.distance = check.distance(&quads, watch)?;
     stats.triangles = quads.census().0;
+    stats.work_limit_reached = work.is_spent();
     Ok((quads, stats))
 }
 
@@ -86,9 +88,21 @@ struct Morpher<'a, 'g> {
     watch: &'a Watch,
     /// How many more attempts there may be under the rules tried.
     left: Cell<usize>,
+    /// What all of it may cost, known when the first triangles are.
+    budget: OnceCell<Budget>,
 }
 
 impl Morpher<'_, '_> {
+    /// What may still be done; `mesh` tells the size of the part.
+    fn budget(&self, mesh: &Mixed) -> &Budget {
+        self.budget.get_or_init(|| Budget::of(mesh.faces().count()))
+    }
+
+    /// Whether nothing more should be begun.
+    fn is_spent(&self) -> bool {
+        self.budget.get().is_some_and(Budget::is_spent)
+    }
+
     /// Remeshes, runs the front, and does again what is not good enough: first with pieces meshed anew, then without.
     /// `None` where other rules gave the same triangles, whose signs are in `begun`.
     fn attempts(
@@ -112,6 +126,7 @@ impl Morpher<'_, '_> {
         let mut few = self.reworked(first.clone(), rules)?;
         if !few.flaws.crossing.is_empty()
             && self.left.get() > 0
+            && !self.is_spent()
             && let Some(other) = self.begin_untangled(rules, stats)?
         {
             let reworked = self.reworked(other.clone(), rules)?;
@@ -121,7 +136,7 @@ impl Morpher<'_, '_> {
             few = few.or(reworked);
         }
         let few = self.improve(few, (2 * most).div_ceil(3), rules, stats, true)?;
-        if few.is_fair() {
+        if few.is_fair() || self.is_spent() {
             return Ok(Some(few));
         }
         let mut many = self.improve(first.clone(), most, rules, stats, false)?;
@@ -151,6 +166,10 @@ impl Morpher<'_, '_> {
         sizes::set(&mut mesh, ground.surface, self.params, self.scale).map_err(QMorphError::Size)?;
         lower_sizes(&mut mesh, places, rules.floor);
         remesh(&mut mesh, ground, rules, watch)?;
+        if mesh.faces().count() > rules.most_faces {
+            let wanted = rules.most_faces.saturating_sub(budget::FEW) as f64 / budget::LOWERED;
+            return Err(QMorphError::LoweredSizes { most: rules.most_faces, wanted });
+        }
         Ok(mesh)
     }
 
@@ -169,7 +188,7 @@ impl Morpher<'_, '_> {
         let mut search = Search::new(first);
         for _ in 1..most {
             let places = search.places(rules);
-            if places.is_empty() || self.left.get() == 0 {
+            if places.is_empty() || self.left.get() == 0 || self.is_spent() {
                 break;
             }
             let mut mesh = search.from().triangles.clone();
@@ -197,8 +216,9 @@ impl Morpher<'_, '_> {
     fn rework(&self, attempt: &mut Attempt, rules: Rules) -> Result<(), Cancelled> {
         self.watch.phase("meshing poor places anew", None);
         let drawn = FxHashSet::default();
-        let mut rework =
-            Rework { ground: self.ground, check: self.check, rules, watch: self.watch, aim: Aim::Sound, drawn };
+        let Self { ground, check, watch, .. } = *self;
+        let budget = self.budget(&attempt.quads);
+        let mut rework = Rework { ground, check, rules, watch, aim: Aim::Sound, drawn, budget };
         for _ in 0..REWORKS {
             let before = attempt.clone();
             let reworked = rework.run(&mut attempt.quads, &mut attempt.flaws, &attempt.awake)?;
@@ -243,7 +263,8 @@ impl Morpher<'_, '_> {
         *flaws = flatten(quads, ground, check, rules.tolerance, flaws, watch)?;
         awake.fill(true);
         let (mut pieced, mut after) = (quads.clone(), flaws.clone());
-        let mut rework = Rework { ground, check, rules, watch, aim: Aim::Flat, drawn: FxHashSet::default() };
+        let (drawn, budget) = (FxHashSet::default(), &Budget::of(quads.faces().count()));
+        let mut rework = Rework { ground, check, rules, watch, aim: Aim::Flat, drawn, budget };
         let reworked = rework.run(&mut pieced, &mut after, awake)?;
         if reworked == 0 {
             return Ok(());
@@ -298,6 +319,8 @@ impl Morpher<'_, '_> {
                 stats.reworked = done.reworked;
             }
         }
+        let made = quads.faces().filter(|&f| awake[quads.region(f) as usize]).count();
+        self.budget(&quads).spend(made);
         advance_and_clean(&mut quads, ground, rules, &awake, &mut stats, watch)?;
         stats.clean_edits += finish(&mut quads, ground, rules.curve_tolerance, &awake, watch)?.edits;
         let mut attempt = Attempt { triangles, signs, awake, quads, stats, ..Attempt::default() };

@@ -29,13 +29,15 @@
 //! - The Euler characteristic and the number of rims stay.
 //!
 //! # Cost
-//! Linear in the faces of input and result, times a logarithm for the way back onto the surface.
+//! Linear in the faces of input and result, times a logarithm for the way back onto the surface. How often faces are
+//! made anew has a limit that is a function of their number (`budget`).
 //!
 //! # Departures
 //! The papers take the triangles as they come and keep their border edges; sampling and remeshing first is what makes
 //! the quads even. Where the paper leaves a triangle to keep a curve, the parity of the borders makes that unnecessary.
 
 mod attempts;
+mod budget;
 mod carry;
 mod check;
 mod flatten;
@@ -165,6 +167,10 @@ pub struct QMorphStats {
     pub regular_share: f64,
     /// How often the front was run: once, and again where distance or shapes were not good enough.
     pub attempts: usize,
+    /// Whether the work that a part of this size may cost was done before distance and shapes were good everywhere: the
+    /// result is then the best that was reached. Larger sizes or tolerances leave less to do.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub work_limit_reached: bool,
     /// The largest distance between quads and surface, certified both ways. Larger than `tolerance` where sizes must not
     /// get small enough.
     pub distance: f64,
@@ -202,6 +208,17 @@ pub enum QMorphError {
     /// The size is too small for the limit.
     #[error("about {0:.3e} faces would be made, and `max-faces` allows {1}")]
     TooManyFaces(f64, usize),
+    /// Sizes near curves ask for far more than the size itself.
+    #[error(
+        "curves and narrow strips lower the sizes so far that more than {most} triangles would be made, where the size \
+         asked for needs about {wanted:.0}: long thin faces carry the sizes of their ends along all their length"
+    )]
+    LoweredSizes {
+        /// Triangles that may be made.
+        most: usize,
+        /// Faces that the size asked for makes.
+        wanted: f64,
+    },
     /// The surface is no oriented manifold.
     #[error("an edge has more than two faces, or two of the same direction")]
     NotManifold,
@@ -219,6 +236,10 @@ impl From<QMorphError> for StepFailure {
             QMorphError::TooManyFaces(..) => {
                 Self::failed(message).with_help("raise `size`, or raise `max-faces` if there is memory for it")
             }
+            QMorphError::LoweredSizes { .. } => Self::failed(message).with_help(
+                "put `refine` with flips = true and the size as `max-edge` before it, raise `curve-tolerance` or \
+                 `min-size`, or take the small parts away with `remove-features`",
+            ),
             QMorphError::NotManifold => Self::new(FailureKind::BadInput, message).with_help("run `repair` first"),
             QMorphError::Empty | QMorphError::NotPositive(..) => Self::new(FailureKind::BadInput, message),
         }
@@ -266,6 +287,7 @@ fn rules(surface: &Surface, params: &QMorphParams, diagonal: f64) -> Result<(Rul
         least_size: params.min_size.map_or(0.25 * least, |length| length.resolve(diagonal)),
         floor: params.min_size.map_or(least / 16.0, |length| length.resolve(diagonal)),
         gradation: params.gradation.clamp(0.05, 2.0),
+        most_faces: usize::MAX,
     };
     positive("size", least)?;
     positive("min-size", rules.least_size)?;
@@ -274,7 +296,7 @@ fn rules(surface: &Surface, params: &QMorphParams, diagonal: f64) -> Result<(Rul
     if faces > params.max_faces as f64 {
         return Err(QMorphError::TooManyFaces(faces, params.max_faces));
     }
-    Ok((rules, least))
+    Ok((Rules { most_faces: budget::most_triangles(faces), ..rules }, least))
 }
 
 /// Recounts the result.

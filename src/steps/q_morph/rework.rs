@@ -7,6 +7,7 @@
 
 use rustc_hash::FxHashSet;
 
+use super::budget::Budget;
 use super::check::{Check, Flaws};
 use super::flatten::{fold, unfold};
 use super::lack::{CROSSING, FAIR, excess, lack_of, shortfall};
@@ -61,6 +62,8 @@ pub(super) struct Rework<'a, 'g> {
     pub(super) aim: Aim,
     /// Patches that were drawn, by their sign and the part of the sizes: again, they would come out the same.
     pub(super) drawn: FxHashSet<(u64, u64, Option<Cuts>)>,
+    /// What drawing may cost.
+    pub(super) budget: &'a Budget,
 }
 
 /// What a rework is after.
@@ -82,7 +85,7 @@ impl Rework<'_, '_> {
         let mut spent: FxHashSet<(u32, bool)> = FxHashSet::default();
         for (face, is_far) in self.places(mesh, flaws, awake) {
             self.watch.check()?;
-            if tried == PLACES {
+            if tried == PLACES || self.budget.is_spent() {
                 break;
             }
             if !mesh.is_face(face) || spent.contains(&(face, is_far)) {
@@ -133,6 +136,8 @@ impl Rework<'_, '_> {
 
     /// Quads for a patch, see [`Patch::remade`].
     fn draw(&self, patch: &Patch, mesh: &Mixed, scale: f64) -> Result<Option<Mixed>, Cancelled> {
+        // A quad is two triangles first.
+        self.budget.spend(2 * patch.faces.len());
         let Some(mut remade) = patch.remade(mesh, self.ground, self.rules, scale, self.watch)? else { return Ok(None) };
         if self.aim == Aim::Flat {
             let Rework { ground, check, rules, watch, .. } = *self;
@@ -254,17 +259,40 @@ pub(super) mod tests {
     }
 
     pub(in super::super) fn rules() -> Rules {
-        Rules { tolerance: 0.1, curve_tolerance: 0.05, shortest: 0.0, least_size: 0.25, floor: 0.1, gradation: 0.3 }
+        Rules {
+            tolerance: 0.1,
+            curve_tolerance: 0.05,
+            shortest: 0.0,
+            least_size: 0.25,
+            floor: 0.1,
+            gradation: 0.3,
+            most_faces: usize::MAX,
+        }
     }
 
-    fn rework(mesh: &mut Mixed, ground: &Ground<'_>) -> usize {
+    fn rework(mesh: &mut Mixed, ground: &Ground<'_>, budget: &Budget) -> usize {
         let watch = Watch::silent();
         let check = Check::new(ground, &watch).unwrap();
         let mut flaws = check.flaws(mesh, rules().tolerance, &watch).unwrap();
         let drawn = FxHashSet::default();
-        Rework { ground, check: &check, rules: rules(), watch: &watch, aim: Aim::Sound, drawn }
+        Rework { ground, check: &check, rules: rules(), watch: &watch, aim: Aim::Sound, drawn, budget }
             .run(mesh, &mut flaws, &[true])
             .unwrap()
+    }
+
+    #[test]
+    fn without_work_that_may_be_done_all_stays() {
+        let surface = square();
+        let ground = Ground::new(&surface);
+        let mut mesh = quads(&ground, &[(id(4, 5), dvec3(5.8, 5.4, 0.0))]);
+        let budget = Budget::of(0);
+        budget.spend(usize::MAX);
+        assert_eq!(rework(&mut mesh, &ground, &budget), 0);
+        assert_eq!(mesh.point(id(4, 5).raw()), dvec3(5.8, 5.4, 0.0));
+        // What is done is counted.
+        let budget = Budget::of(0);
+        assert!(rework(&mut mesh, &ground, &budget) > 0);
+        assert!(budget.left() < Budget::of(0).left());
     }
 
     #[test]
@@ -276,7 +304,7 @@ pub(super) mod tests {
         let mut mesh = quads(&ground, &knot);
         let least = |mesh: &Mixed| mesh.faces().map(|f| mesh.quality(f)).fold(1.0, f64::min);
         assert!(least(&mesh) < 0.0);
-        assert!(rework(&mut mesh, &ground) > 0);
+        assert!(rework(&mut mesh, &ground, &Budget::of(0)) > 0);
         assert_eq!(mesh.faults(), [] as [String; 0]);
         assert_eq!(mesh.census().0, 0, "there are triangles");
         assert!(least(&mesh) > 0.5, "{}", least(&mesh));
@@ -322,7 +350,7 @@ pub(super) mod tests {
         let surface = square();
         let ground = Ground::new(&surface);
         let mut mesh = quads(&ground, &[]);
-        assert_eq!(rework(&mut mesh, &ground), 0);
+        assert_eq!(rework(&mut mesh, &ground, &Budget::of(0)), 0);
         assert_eq!(mesh.census(), (0, (N * N) as usize));
     }
 

@@ -208,8 +208,15 @@ mod tests {
 
     #[test]
     fn a_detour_goes_on_from_worse_attempts_and_is_blamed_once() {
-        let rules =
-            Rules { tolerance: 0.1, curve_tolerance: 0.1, shortest: 0.0, least_size: 0.1, floor: 1e-3, gradation: 0.3 };
+        let rules = Rules {
+            tolerance: 0.1,
+            curve_tolerance: 0.1,
+            shortest: 0.0,
+            least_size: 0.1,
+            floor: 1e-3,
+            gradation: 0.3,
+            most_faces: usize::MAX,
+        };
         let mut search = Search::new(attempt([1.0, 1.0]));
         let first = search.places(rules);
         assert_eq!(first.len(), 2);
@@ -239,8 +246,15 @@ mod tests {
         let square = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(|[x, y]| glam::dvec3(x, y, 0.0));
         let quads = crate::technique::mixed::Mixed::of_faces(&square, &[&[0, 1, 2, 3]]).unwrap();
         let mut crossed = Attempt { quads, lack: 0.1, by_region: vec![0.1], ..Attempt::default() };
-        let rules =
-            Rules { tolerance: 0.1, curve_tolerance: 0.1, shortest: 0.0, least_size: 0.1, floor: 1e-3, gradation: 0.3 };
+        let rules = Rules {
+            tolerance: 0.1,
+            curve_tolerance: 0.1,
+            shortest: 0.0,
+            least_size: 0.1,
+            floor: 1e-3,
+            gradation: 0.3,
+            most_faces: usize::MAX,
+        };
         assert!(crossed.is_good());
         crossed.flaws.crossing.push(0);
         assert!(!crossed.is_good() && !crossed.is_fair());
@@ -250,8 +264,15 @@ mod tests {
 
     #[test]
     fn the_same_is_not_asked_twice() {
-        let rules =
-            Rules { tolerance: 0.1, curve_tolerance: 0.1, shortest: 0.0, least_size: 9.0, floor: 9.0, gradation: 0.3 };
+        let rules = Rules {
+            tolerance: 0.1,
+            curve_tolerance: 0.1,
+            shortest: 0.0,
+            least_size: 9.0,
+            floor: 9.0,
+            gradation: 0.3,
+            most_faces: usize::MAX,
+        };
         let mut search = Search::new(attempt([1.0, 1.0]));
         assert_eq!(search.places(rules).len(), 2);
         learn(&mut search, None);

@@ -109,6 +109,7 @@ mod tests {
             least_size: 0.1,
             floor: 0.002,
             gradation: 0.3,
+            most_faces: usize::MAX,
         };
         let make = |places: &[Wish]| {
             let mut mesh = ground.workshop().unwrap();

@@ -256,9 +256,8 @@ impl From<RepairError> for StepFailure {
             RepairError::NoArea { .. } => {
                 Self::failed(message).with_help("look at the file in a viewer: it may hold curves written as faces")
             }
-            RepairError::BeyondArithmetic { .. } => {
-                Self::bad_input(message).with_help("move the part to the origin, and write it in another unit of length")
-            }
+            RepairError::BeyondArithmetic { .. } => Self::bad_input(message)
+                .with_help("move the part to the origin, and write it in another unit of length"),
             RepairError::RunsThrough { worst, .. } => Self::failed(message)
                 .with_help(
                     "join the bodies in the program that made them, or mesh each by itself; \

@@ -10,6 +10,9 @@ use crate::watch::{Cancelled, Watch};
 /// Vertices whose faces cost less each are not worth a search.
 const FINE: f64 = 5e-4;
 
+/// Steps of one search; a few dozen do, and a cost that is no number would never be low enough.
+const STEPS: usize = 1000;
+
 /// The other corners of a face at a vertex, counter-clockwise, and what of its shape a move of the vertex leaves.
 struct Corner {
     next: DVec3,
@@ -222,7 +225,10 @@ impl Cleaner<'_, '_> {
         let (mut best, mut cost) = (start, first);
         let reach = self.reach(v);
         let mut step = first_step * reach;
-        while step > 0.01 * reach {
+        for _ in 0..STEPS {
+            if step <= 0.01 * reach {
+                break;
+            }
             let before = cost;
             for (a, b) in [(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)] {
                 let p = best + step * (a * x + b * y);
@@ -257,7 +263,10 @@ impl Cleaner<'_, '_> {
         let most = sag(at).max(self.curve_tolerance);
         let (mut best, mut cost) = (at, first);
         let mut step = 0.1 * reach;
-        while step > 0.01 * reach {
+        for _ in 0..STEPS {
+            if step <= 0.01 * reach {
+                break;
+            }
             let before = cost;
             for p in [best - step, best + step] {
                 let c = star.cost(curve.at(p));

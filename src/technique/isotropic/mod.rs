@@ -47,6 +47,8 @@ pub struct Rules {
     pub floor: f64,
     /// How much the size may grow over a unit of length.
     pub gradation: f64,
+    /// Sizes are not lowered any more where there are more triangles; the caller is to look at their number.
+    pub most_faces: usize,
 }
 
 /// How often sizes are lowered where they prove too large.
@@ -162,7 +164,8 @@ impl Remesher<'_, '_> {
                 self.asleep.clear();
             }
             self.surplus.clear();
-            if adaptation == times || !self.lower_sizes() {
+            let is_full = self.mesh.faces().count() > self.rules.most_faces;
+            if adaptation == times || is_full || !self.lower_sizes() {
                 break;
             }
             self.grade();
@@ -180,7 +183,8 @@ impl Remesher<'_, '_> {
             let collapsed = self.collapse_short();
             self.flip();
             self.smooth();
-            if round >= 2 && collapsed <= self.mesh.edges().count() / QUIET {
+            let is_full = self.mesh.faces().count() > self.rules.most_faces;
+            if is_full || (round >= 2 && collapsed <= self.mesh.edges().count() / QUIET) {
                 break;
             }
         }
@@ -251,7 +255,8 @@ impl Remesher<'_, '_> {
     fn split_long(&mut self) {
         let most = GROWTH * self.wanted_faces() + 2.0 * self.mesh.faces().count() as f64;
         for _ in 0..12 {
-            if self.mesh.faces().count() as f64 > most {
+            let count = self.mesh.faces().count();
+            if count as f64 > most || count > self.rules.most_faces {
                 break;
             }
             let mut long: Vec<(f64, u32)> = Vec::new();
