@@ -138,13 +138,32 @@ pub fn triangle_size(corners: [DVec3; 3]) -> f64 {
     a.max(b).max(c)
 }
 
+/// The triangle moved to the origin and scaled by a power of two, where squares and products of its sides would leave
+/// the range of floats; `None` elsewhere. What does not depend on place and size is the same of it.
+pub fn rescaled([a, b, c]: [DVec3; 3]) -> Option<[DVec3; 3]> {
+    let (u, v) = (b - a, c - a);
+    let most = u.abs().max(v.abs()).max_element();
+    if most == 0.0 || !most.is_finite() || (1e-70..1e70).contains(&most) {
+        return None;
+    }
+    // In two steps, since the power itself may be out of range.
+    let half = libm::exp2(-libm::floor(0.5 * libm::log2(most)));
+    Some([DVec3::ZERO, u * half * half, v * half * half])
+}
+
 /// Stretch: √12 · inradius / longest side; 1 for the equilateral triangle, 0 without area.
 #[inline]
 pub fn stretch(corners: [DVec3; 3]) -> f64 {
     let [a, b, c] = side_lengths(corners);
     let longest = a.max(b).max(c);
     let s = (a + b + c) / 2.0;
-    if s > 0.0 { 12.0_f64.sqrt() * (triangle_area(corners) / s) / longest } else { 0.0 }
+    let area = triangle_area(corners);
+    if !(area > 0.0 && area.is_finite())
+        && let Some(scaled) = rescaled(corners)
+    {
+        return stretch(scaled);
+    }
+    if s > 0.0 { 12.0_f64.sqrt() * (area / s) / longest } else { 0.0 }
 }
 
 /// The aspect ratio (√3/2) · longest side / height on it; 1 for the equilateral triangle, infinite without area.
@@ -250,6 +269,18 @@ mod tests {
     }
 
     const RIGHT: [DVec3; 3] = [DVec3::ZERO, DVec3::new(3.0, 0.0, 0.0), DVec3::new(0.0, 4.0, 0.0)];
+
+    #[test]
+    fn shape_does_not_depend_on_size() {
+        for scale in [1e-300, 1e-150, 1e-80, 1e80, 1e160, 1e300] {
+            let corners = RIGHT.map(|p| scale * p);
+            near(stretch(corners), stretch(RIGHT));
+            let scaled = rescaled(corners).expect("it is out of range");
+            assert!(scaled.iter().all(|p| p.abs().max_element() < 8.0));
+            near(aspect_ratio(scaled), aspect_ratio(RIGHT));
+        }
+        assert_eq!(rescaled(RIGHT), None);
+    }
 
     #[test]
     fn a_3_4_5_triangle_has_known_figures() {

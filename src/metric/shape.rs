@@ -37,11 +37,12 @@ struct Figures {
     flatness: f64,
 }
 
-fn figures(corners: [DVec3; 3]) -> Figures {
+fn figures(own: [DVec3; 3]) -> Figures {
+    let corners = geometry::rescaled(own).unwrap_or(own);
     let size = geometry::triangle_size(corners);
     let area = geometry::triangle_area(corners);
     Figures {
-        sides: geometry::side_lengths(corners),
+        sides: geometry::side_lengths(own),
         stretch: geometry::stretch(corners),
         aspect: geometry::aspect_ratio(corners),
         angles: geometry::triangle_angles(corners).map(f64::to_degrees),
