@@ -1,5 +1,6 @@
 //! The metrics: one definition each, used by steps, gates, sweeps, reports and snapshots.
 
+pub mod crossing;
 pub mod distance;
 pub mod feature;
 pub mod gate;

@@ -1,5 +1,6 @@
 //! Judging a mesh by the checks of a gate.
 
+use super::super::crossing::compare;
 use super::super::distance::{Decision, Target, decide, upper_bound};
 use super::super::number::number_text;
 use super::super::registry::{MetricDef, Needs, Unit, find, lost_groups};
@@ -92,10 +93,11 @@ fn judge(subject: &Subject<'_>, metric: &MetricDef, check: &Check) -> Result<Gat
     {
         return judge_distance(subject, check, sides, at_most, &bounds);
     }
-    Ok(match column(subject, metric.name) {
-        Some(column) => judge_column(subject, check, column, &bounds),
-        None => judge_whole(subject, metric, &bounds),
-    })
+    if let Some(column) = column(subject, metric.name) {
+        return Ok(judge_column(subject, check, column, &bounds));
+    }
+    let whole = judge_whole(subject, metric, &bounds);
+    Ok(if judges_crossings(check) { by_place(subject, whole) } else { whole })
 }
 
 fn resolve(subject: &Subject<'_>, metric: &MetricDef, check: &Check) -> Bounds {
@@ -225,6 +227,40 @@ fn note_of(excused: u64, needed: Option<f64>, nothing: bool, except: usize) -> O
         notes.push("there is no element to judge".to_owned());
     }
     (!notes.is_empty()).then(|| notes.join("; "))
+}
+
+/// Whether a check asks for no crossings besides those of the reference, and for nothing else.
+fn judges_crossings(check: &Check) -> bool {
+    let is_bounded = check.at_least.is_some() || check.at_most.is_some() || check.equals.is_some();
+    ["self-intersections", "self-intersecting-faces"].contains(&check.metric.as_str())
+        && check.no_more_than_reference
+        && !check.same_as_reference
+        && !is_bounded
+}
+
+/// More pairs than in the reference are no fault where they lie along the crossings of the reference.
+fn by_place(subject: &Subject<'_>, mut out: GateRow) -> GateRow {
+    let Some(reference) = subject.reference() else { return out };
+    let complete = subject.intersections().complete && reference.intersections().complete;
+    if out.passed || !complete || reference.intersections().pairs.is_empty() {
+        return out;
+    }
+    let found = compare(subject, reference);
+    let lengths =
+        format!("{} long, {} in the reference", number_text(found.length), number_text(found.reference_length));
+    if found.is_old() {
+        out.passed = true;
+        (out.fault_count, out.faults) = (0, Vec::new());
+        out.note = Some(format!("along the crossings of the reference: {lengths}"));
+    } else if found.elsewhere.is_empty() {
+        out.note = Some(format!("at the places of the reference's, but longer: {lengths}"));
+    } else {
+        let new: std::collections::BTreeSet<u32> = found.elsewhere.iter().map(|face| face.raw()).collect();
+        out.faults.retain(|fault| new.contains(&fault.id));
+        out.fault_count = new.len() as u64;
+        out.note = Some("these lie elsewhere than the crossings of the reference".to_owned());
+    }
+    out
 }
 
 fn judge_whole(subject: &Subject<'_>, metric: &MetricDef, bounds: &Bounds) -> GateRow {

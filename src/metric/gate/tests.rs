@@ -174,3 +174,36 @@ fn a_check_of_a_count_that_stopped_fails_and_says_so() {
     let same = one(&mesh, Some(&mesh), Check { no_more_than_reference: true, ..check("self-intersections") });
     assert!(!same.passed && same.limit.contains('≥'), "{}", same.limit);
 }
+
+#[test]
+fn crossings_are_compared_with_those_of_the_reference_by_place() {
+    // Two sheets that run through each other, cut into so many strips across.
+    let sheets = |count: u32, tilt: f64| {
+        let mut mesh = Soup::default();
+        for upright in [false, true] {
+            let base = mesh.points.len() as u32;
+            for at in 0..=count {
+                let along = f64::from(at) / f64::from(count);
+                for side in [-0.4, 0.6] {
+                    let point = if upright { dvec3(tilt, along, side) } else { dvec3(side, along, 0.0) };
+                    mesh.points.push(point);
+                }
+            }
+            for at in 0..count {
+                let corner = |n: u32| VertexId::from_raw(base + 2 * at + n);
+                mesh.faces.push(Facet::Quad([corner(0), corner(1), corner(3), corner(2)]));
+            }
+        }
+        mesh
+    };
+    let no_more = || Check { no_more_than_reference: true, ..check("self-intersections") };
+    let (coarse, fine) = (sheets(1, 0.0), sheets(9, 0.0));
+    let row = one(&fine, Some(&coarse), no_more());
+    assert!(row.passed && row.fault_count == 0, "{row:?}");
+    assert!(row.note.as_deref().is_some_and(|note| note.starts_with("along the crossings")), "{row:?}");
+    let elsewhere = one(&sheets(9, 0.1), Some(&coarse), no_more());
+    assert!(!elsewhere.passed && elsewhere.fault_count > 8 && !elsewhere.faults.is_empty(), "{elsewhere:?}");
+    // A number given is a number.
+    let at_most = Check { at_most: Some(Limit::Number(1.0)), ..check("self-intersections") };
+    assert!(!one(&fine, Some(&coarse), at_most).passed);
+}
