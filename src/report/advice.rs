@@ -82,6 +82,12 @@ impl Chain<'_> {
             "faces" | "triangles" | "quads" | "vertices" => {
                 self.turn("raise", &["max-size", "size", "max-edge", "interval", "tolerance"])
             }
+            "volume-drift" => {
+                let first = self.turn("lower", &["tolerance"])?;
+                Some(format!(
+                    "{first}: where it is larger than a wall, the sides of the wall come to lie on each other"
+                ))
+            }
             "closed" | "boundary-edges" | "boundary-loops" => self.holes(),
             "manifold" | "edge-manifold" | "vertex-manifold" | "oriented" | "non-manifold-edges" | "components" => {
                 self.turn("look at the statistics of `repair`, and turn", &["weld", "non-manifold"])

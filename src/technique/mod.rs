@@ -30,5 +30,6 @@ pub mod refine;
 pub mod remesh;
 pub mod split_curves;
 pub mod surface_curve;
+pub mod thickness;
 pub mod triangulate_loop;
 pub mod vsa;

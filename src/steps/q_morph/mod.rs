@@ -59,6 +59,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::mesh::geometry::Aabb;
 use crate::mesh::{Quads, Surface};
+use crate::metric::number::number_text;
 use crate::step::{
     Artifact, FailureKind, InputDef, Inputs, Length, Locks, OutPort, OutputDef, Port, Produced, Sizing,
     Step as StepContract, StepFailure,
@@ -67,6 +68,7 @@ use crate::technique::clean_quads::{census, clean, finish, sharpest_sector};
 use crate::technique::ground::{Choice, Ground};
 use crate::technique::isotropic::{Rules, curve_distance};
 use crate::technique::mixed::Mixed;
+use crate::technique::thickness::thinner_than;
 use crate::watch::{Cancelled, Watch};
 
 use attempts::morph;
@@ -179,6 +181,9 @@ pub struct QMorphStats {
     /// Faces that are inverted or flat, with their middles; none in a sound result.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub inverted: Vec<InvertedFace>,
+    /// Walls that the tolerance does not keep apart; a run says it.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub warnings: Vec<String>,
 }
 
 /// A face that did not come out right.
@@ -256,6 +261,10 @@ pub fn q_morph(surface: &Surface, params: &QMorphParams, watch: &Watch) -> Resul
     }
     let diagonal = Aabb::of(surface.points.iter().copied()).diagonal();
     let (rules, size) = rules(surface, params, diagonal)?;
+    let thin = thin_walls(surface, rules.tolerance);
+    if let Some(thin) = &thin {
+        tracing::warn!("{thin}");
+    }
     let angle = params.border_angle.clamp(0.0, 90.0).to_radians();
     let choice = Choice { angle, reach: 0.5 * size, gap: 0.25 * size };
     let ground = Ground::following(surface, (angle > 0.0).then_some(&choice));
@@ -271,7 +280,21 @@ pub fn q_morph(surface: &Surface, params: &QMorphParams, watch: &Watch) -> Resul
     }
     stats.curve_distance = curve_distance(&mesh, &ground);
     judge(&mesh, &mut stats);
+    stats.warnings = thin.into_iter().collect();
     Ok((Quads { mesh: carry::leave(&mesh, &ground), cover: None }, stats))
+}
+
+/// What is said where the sides of walls may come to lie on each other, in time to stop the work.
+fn thin_walls(surface: &Surface, tolerance: f64) -> Option<String> {
+    /// The thin ends of wedges are no walls.
+    const TELLING: f64 = 0.05;
+    let walls = thinner_than(surface, tolerance).filter(|walls| walls.share >= TELLING)?;
+    let (share, thinnest) = (100.0 * walls.share, number_text(walls.thinnest));
+    Some(format!(
+        "on {share:.0}% of the part the walls are thinner than `tolerance`, {thinnest} where it is {}: their sides may come \
+         to lie on each other; lower `tolerance` below that, or mesh one side as a shell",
+        number_text(tolerance)
+    ))
 }
 
 /// The rules, and the least size.

@@ -35,6 +35,7 @@ mod draft;
 mod duplicate;
 mod holes;
 mod intersect;
+mod near;
 mod non_manifold;
 mod orient;
 mod outward;
@@ -83,6 +84,7 @@ pub fn repair(soup: &Soup, params: &RepairParams, watch: &Watch) -> Result<(Surf
     }
     let crossing_size = params.crossing_size.map(|size| size.resolve(diagonal));
     count_intersections(&surface, soup, crossing_size, &mut stats, watch)?;
+    stats.warnings = near::beside_each_other(&surface).into_iter().collect();
     Ok((surface, stats))
 }
 

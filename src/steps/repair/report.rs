@@ -86,6 +86,9 @@ pub struct RepairStats {
     pub self_intersecting_faces: Vec<u32>,
     /// How far the surface may have moved outside filled holes at most: a bound, in mesh units.
     pub max_move: f64,
+    /// Borders that lie beside each other and are not joined; a run says it.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub warnings: Vec<String>,
 }
 
 impl RepairStats {
