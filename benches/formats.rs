@@ -1,4 +1,5 @@
-//! Reading and writing, one thread: a wavy sheet of a million triangles as binary STL, and a smaller one in each format.
+//! Reading and writing, one thread: a wavy sheet of a million triangles as binary STL, and a smaller one in each
+//! format.
 
 use std::hint::black_box;
 

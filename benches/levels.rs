@@ -1,5 +1,5 @@
-//! Fronts out of hierarchies of 120 000 and of a million faces, in process after decoding: by count, by curvature and by
-//! density. Each should take less than a tenth of a second, and less than a second.
+//! Fronts out of hierarchies of 120 000 and of a million faces, in process after decoding: by count, by curvature and
+//! by density. Each should take less than a tenth of a second, and less than a second.
 
 mod shapes;
 

@@ -1,9 +1,10 @@
 //! From regions to quads in pictures: `pictures [--flip] MESH FOLDER`.
 //!
-//! Repairs the mesh, marks its features, partitions it, straightens the borders, cuts along them and makes quads, all with
-//! default parameters but the size of 3 %. Writes `regions.png` (the mesh as it was, each region in a colour), `split.png`
-//! (cut along the curves, which are drawn bold), `quads.png` (by scaled Jacobian, blue is a square) and `quad-regions.png`,
-//! the same four as VTU, and `curves.obj` (the curves as polylines); prints what each step says of itself.
+//! Repairs the mesh, marks its features, partitions it, straightens the borders, cuts along them and makes quads, all
+//! with default parameters but the size of 3 %. Writes `regions.png` (the mesh as it was, each region in a colour),
+//! `split.png` (cut along the curves, which are drawn bold), `quads.png` (by scaled Jacobian, blue is a square) and
+//! `quad-regions.png`, the same four as VTU, and `curves.obj` (the curves as polylines); prints what each step says of
+//! itself.
 #![expect(clippy::print_stdout, reason = "the statistics are to be read")]
 
 use std::error::Error;

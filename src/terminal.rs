@@ -1,4 +1,5 @@
-//! Text from files, made fit to be shown: names of groups, fields and files are anybody's, and must not steer a terminal.
+//! Text from files, made fit to be shown: names of groups, fields and files are anybody's, and must not steer a
+//! terminal.
 
 use std::borrow::Cow;
 

@@ -1,4 +1,5 @@
-//! Decks that include other files: read with them, from below their folder only, and up to date only while all are as they were.
+//! Decks that include other files: read with them, from below their folder only, and up to date only while all are as
+//! they were.
 
 use std::fs;
 use std::path::PathBuf;

@@ -129,6 +129,21 @@ fn forbidden(file: &str, module: &str, target: &str) -> bool {
     LAYERS.iter().any(|(name, _)| *name == target) && !allowed.contains(&target) && !read_may_use_formats
 }
 
+/// As wide as rustfmt makes code; it leaves comments alone.
+const WIDTH: usize = 120;
+
+#[test]
+fn comments_are_no_wider_than_code() {
+    let mut faults = Vec::new();
+    for path in ["src", "tests", "benches", "examples"].into_iter().flat_map(rust_files) {
+        let text = fs::read_to_string(&path).expect("readable source");
+        let comments = text.lines().enumerate().filter(|(_, line)| line.trim_start().starts_with("//"));
+        let wide = comments.filter(|(_, line)| line.chars().count() > WIDTH);
+        faults.extend(wide.map(|(number, _)| format!("{}:{}", relative(&path), number + 1)));
+    }
+    assert!(faults.is_empty(), "comments wider than {WIDTH}:\n{}", faults.join("\n"));
+}
+
 #[test]
 fn imports_point_only_downwards() {
     let mut faults = Vec::new();

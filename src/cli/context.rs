@@ -111,8 +111,8 @@ pub(super) fn plan_cases(
     Ok(plan::plan_cases(recipe, cases, columns, &context)?)
 }
 
-/// The files below a folder that fit a pattern, sorted, at most so many. What fits and cannot be used is an error: a study
-/// that leaves out parts without a word is wrong.
+/// The files below a folder that fit a pattern, sorted, at most so many. What fits and cannot be used is an error: a
+/// study that leaves out parts without a word is wrong.
 pub(super) fn list_files(folder: &Path, pattern: &str, most: usize) -> Result<Vec<PathBuf>, String> {
     let folder = glob::Pattern::escape(&folder.to_string_lossy());
     let pattern = Path::new(&folder).join(pattern);
@@ -129,8 +129,8 @@ pub(super) fn list_files(folder: &Path, pattern: &str, most: usize) -> Result<Ve
     Ok(files)
 }
 
-/// Fails where a file or folder fits a part of the pattern, and patterns pass it over: its name is not UTF-8, or it is a
-/// link that leads nowhere.
+/// Fails where a file or folder fits a part of the pattern, and patterns pass it over: its name is not UTF-8, or it is
+/// a link that leads nowhere.
 fn unusable_names(pattern: &Path) -> Result<(), String> {
     for whole in pattern.ancestors() {
         let (Some(parent), Some(name)) = (whole.parent(), whole.file_name()) else { continue };
@@ -185,7 +185,8 @@ impl Planned {
             let text = texts.iter().find(|(name, _)| Path::new(name) == file);
             Seen::of(&file, text.map(|(_, text)| text.as_bytes()))
         };
-        // Which files a deck includes is known only by reading it: what is seen before that says whether it is still so.
+        // Which files a deck includes is known only by reading it: what is seen before that says whether it is still
+        // so.
         let (mut files, mut seen) = (BTreeSet::new(), Vec::new());
         loop {
             let before = seen.len();

@@ -1,4 +1,5 @@
-//! `meshmill convert`: a mesh from any format to any other, with all that it carries; what the other cannot hold is told.
+//! `meshmill convert`: a mesh from any format to any other, with all that it carries; what the other cannot hold is
+//! told.
 
 use std::path::{Path, PathBuf};
 

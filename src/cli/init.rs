@@ -1,8 +1,8 @@
 //! `meshmill init`: a commented recipe for a mesh, with sizes that suit it.
 //!
-//! The recipe is `pipelines/fe-surface.toml` with other values: there is one template, and what that recipe gains, this one
-//! gains too. The mesh is looked at as the recipe will see it, after `repair`: a CAD tessellation whose faces share no
-//! vertices is closed.
+//! The recipe is `pipelines/fe-surface.toml` with other values: there is one template, and what that recipe gains, this
+//! one gains too. The mesh is looked at as the recipe will see it, after `repair`: a CAD tessellation whose faces share
+//! no vertices is closed.
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};

@@ -39,7 +39,8 @@ pub(super) struct Arguments {
     /// List the cases and run nothing.
     #[arg(long)]
     list: bool,
-    /// Write `report.html` too: scatter with the Pareto front, parallel coordinates, a picture and the mesh of each case.
+    /// Write `report.html` too: scatter with the Pareto front, parallel coordinates, a picture and the mesh of each
+    /// case.
     #[arg(long)]
     pub(super) report: bool,
     /// Print the table as one JSON document.

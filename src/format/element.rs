@@ -1,8 +1,9 @@
 //! Finite elements as the solver formats name them: what a reader keeps of each, and mid-side nodes for writers.
 //!
 //! Reading: [`Elements`] takes the elements of a file one by one. Triangles and quads become faces, of a second-order
-//! element only the corners are used, lines and points become group members, volumes are left out, except where there is nothing
-//! else: then their skin is the mesh; the counts of what was left out are kept. Nodes that only mid-side positions or volumes used are dropped at the end.
+//! element only the corners are used, lines and points become group members, volumes are left out, except where there
+//! is nothing else: then their skin is the mesh; the counts of what was left out are kept. Nodes that only mid-side
+//! positions or volumes used are dropped at the end.
 //!
 //! Writing: [`elevate`] adds a node in the middle of each edge, once an edge, so that neighbours share it. Where the
 //! caller gives a projector, the node is moved onto that surface. An element stays valid when the Jacobian determinant
@@ -131,8 +132,8 @@ impl Elements {
         Placed::Volume(self.volumes.push(&nodes[..corners.min(nodes.len())]))
     }
 
-    /// Where the file has volumes and no faces, their skin becomes the faces. The faces of each volume, by its number, with
-    /// a bit for each side that is one; `None` where there is no skin.
+    /// Where the file has volumes and no faces, their skin becomes the faces. The faces of each volume, by its number,
+    /// with a bit for each side that is one; `None` where there is no skin.
     pub(super) fn skin(&mut self, points: &[DVec3]) -> Option<Vec<Own>> {
         if !self.faces.is_empty() {
             return None;
@@ -196,9 +197,9 @@ impl Elements {
         }
     }
 
-    /// Finishes `soup`, whose points are all nodes of the file and whose groups and fields name them: sets the faces and
-    /// drops the nodes that no face, line or point has as a corner but some element had otherwise. A file without faces
-    /// is refused.
+    /// Finishes `soup`, whose points are all nodes of the file and whose groups and fields name them: sets the faces
+    /// and drops the nodes that no face, line or point has as a corner but some element had otherwise. A file without
+    /// faces is refused.
     pub(super) fn finish(mut self, soup: &mut Soup) -> Result<ReadCounts, FormatError> {
         if self.faces.is_empty() {
             return Err(match self.counts.elements_dropped {

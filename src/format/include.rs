@@ -2,8 +2,8 @@
 //! places of errors. The caller opens the files; formats open none.
 //! There are at most [`MOST_INCLUDES`] of them.
 //!
-//! Abaqus and CalculiX write `*INCLUDE, INPUT=file`, Nastran `INCLUDE 'file'`, where a quoted name may go on in the next
-//! lines. A file may include others, at most [`DEEPEST`] deep; one that includes itself is refused.
+//! Abaqus and CalculiX write `*INCLUDE, INPUT=file`, Nastran `INCLUDE 'file'`, where a quoted name may go on in the
+//! next lines. A file may include others, at most [`DEEPEST`] deep; one that includes itself is refused.
 //!
 //! Linear in the size of all files; the caller bounds that.
 
@@ -14,8 +14,8 @@ use super::error::{FormatError, Place, Reason};
 
 /// So deep files may include each other.
 pub const DEEPEST: usize = 16;
-/// So many includes a deck may have, each counted as often as it is made: files that include others many times could keep
-/// a reader busy for ever without ever being large.
+/// So many includes a deck may have, each counted as often as it is made: files that include others many times could
+/// keep a reader busy for ever without ever being large.
 pub const MOST_INCLUDES: usize = 10_000;
 /// A quoted name of a Nastran deck goes over this many lines at most.
 const MOST_LINES: usize = 8;

@@ -186,8 +186,8 @@ impl Format {
         self.def().endings
     }
 
-    /// Whether a file is binary where nobody says otherwise: wherever the format has it, but for OFF, whose binary kind few
-    /// programs read.
+    /// Whether a file is binary where nobody says otherwise: wherever the format has it, but for OFF, whose binary kind
+    /// few programs read.
     pub fn is_binary_by_default(self) -> bool {
         self != Self::Off
     }

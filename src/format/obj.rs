@@ -3,8 +3,8 @@
 //! Layout after Wavefront Technologies, "Advanced Visualizer Manual", appendix B1, 1993. Read are `v` (weights and
 //! colours after the coordinates are ignored), `f` (texture and normal numbers are ignored), `l`, `p`, `g`, `o` and
 //! `usemtl`; textures, normals and the like are skipped, `call` is refused, since it takes data from elsewhere, and all
-//! other statements, such as those of free-form surfaces, are skipped and named. The file is walked twice, first for the vertices, so that faces may point at
-//! later vertices; relative numbers count back from the vertices above them.
+//! other statements, such as those of free-form surfaces, are skipped and named. The file is walked twice, first for
+//! the vertices, so that faces may point at later vertices; relative numbers count back from the vertices above them.
 //!
 //! Each name of `g`, `o` and `usemtl` becomes a face group, lines an edge group and points a vertex group of the
 //! current names, `lines` and `points` without one. Lost on writing: fields, regions as labels (they become groups),

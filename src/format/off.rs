@@ -3,8 +3,9 @@
 //! Layout after the Geomview manual, chapter "OFF: numbered polygons" (Geometry Center, 1996). The prefixes `ST`, `C`
 //! and `N` are understood and their values skipped; `4` and `n` (more than three dimensions) are refused. The keyword
 //! may be missing, the counts may stand on its line, and comments may stand anywhere. A vertex and a face are a line
-//! each; values after the ones needed are skipped, as many as a normal, a colour and a texture position have. Binary files come in both byte orders and with or without the colours that the
-//! manual asks for after each face, because programs differ; the variant is chosen that uses up the file exactly.
+//! each; values after the ones needed are skipped, as many as a normal, a colour and a texture position have. Binary
+//! files come in both byte orders and with or without the colours that the manual asks for after each face, because
+//! programs differ; the variant is chosen that uses up the file exactly.
 //!
 //! OFF has no groups. The text writer adds them as comments after the last face, one line a group,
 //! `#group faces 0-17,20 NAME`, which other programs skip and this reader understands. Lost on writing: fields; in
@@ -42,8 +43,9 @@ impl Variant {
         4 * (3 + if self.normal { 3 } else { 0 } + if self.colour { 4 } else { 0 } + if self.texture { 2 } else { 0 })
     }
 
-    /// Whether a vertex of a text file may have `more` values after its coordinates: a normal, a colour of three or four,
-    /// and with texture two more. Programs leave them out, and write them where the keyword has no letter for them.
+    /// Whether a vertex of a text file may have `more` values after its coordinates: a normal, a colour of three or
+    /// four, and with texture two more. Programs leave them out, and write them where the keyword has no letter for
+    /// them.
     fn may_follow(self, more: usize) -> bool {
         let usual = |more| matches!(more, 0 | 3 | 4 | 6 | 7);
         usual(more) || (self.texture && more.checked_sub(2).is_some_and(usual))

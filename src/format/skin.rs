@@ -1,8 +1,9 @@
 //! The skin of a volume mesh: the faces that one volume alone has.
 //!
-//! Corners of tetrahedra, pyramids, wedges and bricks come in the order that Abaqus, Nastran, Gmsh and VTK share: the bottom,
-//! then the top above it. Sides are numbered as in Abaqus. A side counts as inner when another volume has the same corners. Faces of the skin keep the
-//! order of the file, by element and side, and look outwards, away from the middle of their element.
+//! Corners of tetrahedra, pyramids, wedges and bricks come in the order that Abaqus, Nastran, Gmsh and VTK share: the
+//! bottom, then the top above it. Sides are numbered as in Abaqus. A side counts as inner when another volume has the
+//! same corners. Faces of the skin keep the order of the file, by element and side, and look outwards, away from the
+//! middle of their element.
 //!
 //! Linear in the number of volumes.
 

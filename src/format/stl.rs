@@ -3,9 +3,9 @@
 //! Layout after 3D Systems, "Stereolithography Interface Specification", 1988. A file is binary when its size is
 //! exactly what the facet count says, whatever its header begins with; else text when it begins with `solid` and the
 //! start has no byte that text cannot have. Keywords may be written in two words and in any case (`end loop`), numbers
-//! with decimal commas, and the last `endsolid` may be missing, which is told. Each named solid becomes a face group; with several solids, a repeated or
-//! missing name becomes `NAME_2` or `solid_2` (the number of the solid). Normals and attribute bytes are ignored:
-//! corners tell the orientation.
+//! with decimal commas, and the last `endsolid` may be missing, which is told. Each named solid becomes a face group;
+//! with several solids, a repeated or missing name becomes `NAME_2` or `solid_2` (the number of the solid). Normals and
+//! attribute bytes are ignored: corners tell the orientation.
 //!
 //! The text writer makes one solid of each set of faces that are in the same groups, the first group's name in name
 //! order, then the rest without a name. Lost on writing: in binary all groups and the precision beyond 32-bit floats,
@@ -229,7 +229,8 @@ fn coordinate(scanner: &mut Scanner<'_>, commas: &mut usize) -> Result<f64, Form
     parse_number(&[whole, b".", fraction].concat(), "a coordinate", scanner.place())
 }
 
-/// Whether `word` ends a `what`: `endloop`, `end loop`, `end_loop`. Where `alone`, `end` does too, with all that follows.
+/// Whether `word` ends a `what`: `endloop`, `end loop`, `end_loop`. Where `alone`, `end` does too, with all that
+/// follows.
 fn is_end(scanner: &mut Scanner<'_>, word: &[u8], what: &[u8], alone: bool) -> bool {
     let is = |word: &[u8], end: &[u8]| word.eq_ignore_ascii_case(end);
     let whole = word.get(..3).filter(|end| is(end, b"end")).map(|_| &word[3..]);

@@ -214,7 +214,8 @@ impl<P: Primitive> Bvh<P> {
         self.for_each_in_but(area, (&[], u32::MAX), visit)
     }
 
-    /// For each node the label that all its primitives have, `u32::MAX` where they differ; for [`Self::for_each_in_but`].
+    /// For each node the label that all its primitives have, `u32::MAX` where they differ; for
+    /// [`Self::for_each_in_but`].
     pub fn labels(&self, of: impl Fn(u32) -> u32) -> Vec<u32> {
         let mut labels = vec![u32::MAX; self.nodes.len()];
         // Children have higher numbers than their node.

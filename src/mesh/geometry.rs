@@ -86,8 +86,8 @@ impl Aabb {
 
     /// The squared distance from `point`; 0 inside.
     ///
-    /// Rounding is monotone, so that it never exceeds `(point - q).length_squared()` for a point `q` of the box: a search
-    /// that passes over boxes farther than the best found so far loses nothing.
+    /// Rounding is monotone, so that it never exceeds `(point - q).length_squared()` for a point `q` of the box: a
+    /// search that passes over boxes farther than the best found so far loses nothing.
     #[inline]
     pub fn distance_squared(&self, point: DVec3) -> f64 {
         (self.min - point).max(point - self.max).max(DVec3::ZERO).length_squared()
@@ -158,7 +158,8 @@ pub fn stretch(corners: [DVec3; 3]) -> f64 {
     let longest = a.max(b).max(c);
     let s = (a + b + c) / 2.0;
     let area = triangle_area(corners);
-    if !(area > 0.0 && area.is_finite())
+    // Beyond these its square, of which it is the root, has lost digits.
+    if !(1e-140..1e140).contains(&area)
         && let Some(scaled) = rescaled(corners)
     {
         return stretch(scaled);

@@ -1,12 +1,12 @@
 //! Exact decisions about points, segments and triangles.
 //!
 //! # Algorithm
-//! Every decision is a combination of signs of `orient2d`, `orient3d` and `incircle`, which the crate `robust` evaluates
-//! exactly (Shewchuk. Adaptive precision floating-point arithmetic and fast robust geometric predicates, DCG 1997).
-//! Coplanar cases are decided in the plane after dropping a coordinate, which loses nothing because coordinates are
-//! copied, not computed. Two triangles are compared as by Guigue and Devillers (Fast and robust triangle-triangle overlap
-//! test using orientation predicates, JGT 2003): first by the sides of their corners, then along the common line; we
-//! decide the second part by the ends of the two intervals, which also tells a touch from a crossing.
+//! Every decision is a combination of signs of `orient2d`, `orient3d` and `incircle`, which the crate `robust`
+//! evaluates exactly (Shewchuk. Adaptive precision floating-point arithmetic and fast robust geometric predicates, DCG
+//! 1997). Coplanar cases are decided in the plane after dropping a coordinate, which loses nothing because coordinates
+//! are copied, not computed. Two triangles are compared as by Guigue and Devillers (Fast and robust triangle-triangle
+//! overlap test using orientation predicates, JGT 2003): first by the sides of their corners, then along the common
+//! line; we decide the second part by the ends of the two intervals, which also tells a touch from a crossing.
 //!
 //! # Invariants
 //! - The answers are those of exact arithmetic on the given coordinates, as long as products of three coordinate

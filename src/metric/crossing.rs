@@ -1,10 +1,10 @@
 //! Whether the crossings of a mesh are those of its reference, at another resolution.
 //!
-//! Pairs of faces cannot be compared between meshes of different sizes: where two bodies run through each other, cutting
-//! every edge in two makes twice as many pairs along the same curve. What can be compared is where they are, and how
-//! long they are. A pair is new when it meets farther than [`APART`] of the reference's diagonal from every place where
-//! the reference's faces meet; and all of them are when they are more than [`LONGER`] times as long as the reference's,
-//! as where surfaces that graze each other begin to weave.
+//! Pairs of faces cannot be compared between meshes of different sizes: where two bodies run through each other,
+//! cutting every edge in two makes twice as many pairs along the same curve. What can be compared is where they are,
+//! and how long they are. A pair is new when it meets farther than [`APART`] of the reference's diagonal from every
+//! place where the reference's faces meet; and all of them are when they are more than [`LONGER`] times as long as the
+//! reference's, as where surfaces that graze each other begin to weave.
 //!
 //! The place of a pair is the segment along which its faces cross, or the polygon in which they overlap, computed in
 //! floats: which faces meet is decided exactly elsewhere.

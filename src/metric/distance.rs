@@ -1,14 +1,14 @@
 //! The distance between two meshes: mean and root mean square of samples, and a certified bound of the maximum.
 //!
 //! # Algorithm
-//! The largest distance from mesh A to mesh B is bounded from above without trusting samples. A convex piece x of a face
-//! of A has two bounds. The distance to one triangle F of B is a convex function, so that over the piece it is largest at
-//! a corner: `max d(corner, F)` bounds the piece, and is exact where F is the nearest everywhere. The distance to B
-//! changes no faster than one moves: `d(centre, B) + radius` bounds it too (as in Guthe, Borodin, Klein. Fast and
-//! accurate Hausdorff distance calculation between meshes, WSCG 2005; Tang, Lee, Kim. Interactive Hausdorff distance
-//! computation for general polygonal models, SIGGRAPH 2009). A piece whose bound exceeds what is already reached
-//! somewhere, by more than the slack, is cut: along the sides of the prism over the face nearest to its centre, which
-//! resolves flat regions in one cut, else in halves.
+//! The largest distance from mesh A to mesh B is bounded from above without trusting samples. A convex piece x of a
+//! face of A has two bounds. The distance to one triangle F of B is a convex function, so that over the piece it is
+//! largest at a corner: `max d(corner, F)` bounds the piece, and is exact where F is the nearest everywhere. The
+//! distance to B changes no faster than one moves: `d(centre, B) + radius` bounds it too (as in Guthe, Borodin, Klein.
+//! Fast and accurate Hausdorff distance calculation between meshes, WSCG 2005; Tang, Lee, Kim. Interactive Hausdorff
+//! distance computation for general polygonal models, SIGGRAPH 2009). A piece whose bound exceeds what is already
+//! reached somewhere, by more than the slack, is cut: along the sides of the prism over the face nearest to its centre,
+//! which resolves flat regions in one cut, else in halves.
 //!
 //! # Invariants
 //! - `lower <= true maximum <= upper`, but for rounding, which is added to `upper`.
@@ -139,7 +139,8 @@ const SAMPLES_A_FACE: usize = 10;
 const SAMPLES: std::ops::RangeInclusive<usize> = 20_000..=200_000;
 
 /// Points spread evenly over the area: one in the middle of each of `count` equal parts of the running area, placed in
-/// its triangle by the plastic-number sequence (Roberts. The unreasonable effectiveness of quasirandom sequences, 2018).
+/// its triangle by the plastic-number sequence (Roberts. The unreasonable effectiveness of quasirandom sequences,
+/// 2018).
 pub fn sample(triangles: &[[DVec3; 3]], count: usize) -> Vec<(u32, DVec3)> {
     let mut running = Vec::with_capacity(triangles.len());
     let mut total = 0.0;
@@ -168,7 +169,8 @@ pub fn sample(triangles: &[[DVec3; 3]], count: usize) -> Vec<(u32, DVec3)> {
 /// Which triangles of the first mesh are looked at.
 type Open<'a> = &'a (dyn Fn(usize) -> bool + Sync);
 
-/// Distance and nearest triangle of every vertex of `from` that a triangle that is `open` uses; infinite for the others.
+/// Distance and nearest triangle of every vertex of `from` that a triangle that is `open` uses; infinite for the
+/// others.
 fn corner_distances(from: &Target, to: &Target, open: Open<'_>) -> Vec<(f64, u32)> {
     let mut used = vec![false; from.points.len()];
     for (t, triangle) in from.cut.corners.iter().enumerate() {
@@ -317,8 +319,8 @@ pub fn decide(from: &Target, to: &Target, threshold: f64, watch: &Watch) -> Resu
 /// Which faces matter.
 pub type Wanted<'a> = &'a (dyn Fn(FaceId) -> bool + Sync);
 
-/// The same for those faces of the first mesh that are `wanted`. What a `memo` of earlier decisions knows to be within is
-/// not looked at, and counts with the threshold towards `upper`: the outcome is the same.
+/// The same for those faces of the first mesh that are `wanted`. What a `memo` of earlier decisions knows to be within
+/// is not looked at, and counts with the threshold towards `upper`: the outcome is the same.
 pub fn decide_where(
     from: &Target,
     to: &Target,

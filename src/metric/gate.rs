@@ -44,8 +44,8 @@ pub struct Check {
     pub reference: Option<String>,
     /// Face groups that are not judged.
     pub except: Vec<String>,
-    /// Files written of the mesh must hold it too, read back: `groups-kept` alone asks for that, for what is measured on
-    /// a mesh is judged on its files anyway.
+    /// Files written of the mesh must hold it too, read back: `groups-kept` alone asks for that, for what is measured
+    /// on a mesh is judged on its files anyway.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub files: bool,
 }

@@ -1,7 +1,7 @@
 //! The list of all metrics: name, unit, direction, what each needs, and the function that measures it.
 //!
-//! One definition each, used by steps, gates, sweeps, reports and snapshots. A metric is one row in one of the four lists
-//! below; its values, where it is the least or largest of many, are named in `gate` for the elements at fault.
+//! One definition each, used by steps, gates, sweeps, reports and snapshots. A metric is one row in one of the four
+//! lists below; its values, where it is the least or largest of many, are named in `gate` for the elements at fault.
 
 use std::sync::LazyLock;
 

@@ -1,7 +1,7 @@
 //! Welds vertices of identical coordinates, for measuring a file.
 //!
-//! Formats such as STL repeat a vertex for every face; a mesh from a file is measured as the surface that it means. Minus
-//! zero equals zero. Steps' results are measured as they are. Vertex fields are dropped, everything else follows.
+//! Formats such as STL repeat a vertex for every face; a mesh from a file is measured as the surface that it means.
+//! Minus zero equals zero. Steps' results are measured as they are. Vertex fields are dropped, everything else follows.
 
 use rustc_hash::FxHashMap;
 

@@ -18,8 +18,8 @@ pub struct Scope {
     pub params: BTreeMap<String, Option<Value>>,
     /// Paths of input files, as they are opened.
     pub inputs: BTreeMap<String, Option<PathBuf>>,
-    /// Where the parameters are written whose values do not stand in the recipe's own section: on the command line, or in
-    /// the axes of a sweep.
+    /// Where the parameters are written whose values do not stand in the recipe's own section: on the command line, or
+    /// in the axes of a sweep.
     pub origins: BTreeMap<String, Span>,
 }
 
@@ -75,8 +75,8 @@ impl Scope {
             .map_err(|error| (!error.message.is_empty()).then(|| diagnostic(error, text, sources)))
     }
 
-    /// Moves problems with an expression to where the values in it were set, when that is not the recipe: what is wrong is
-    /// the argument, and the recipe only uses it.
+    /// Moves problems with an expression to where the values in it were set, when that is not the recipe: what is wrong
+    /// is the argument, and the recipe only uses it.
     pub fn blame(&self, problems: &mut [Diagnostic], sources: &SourceMap) {
         for problem in problems {
             let Some(formula) = problem.labels.first().and_then(|first| formula_at(first.span, sources)) else {

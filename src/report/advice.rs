@@ -1,7 +1,7 @@
 //! What to turn when a gate fails: the step and the parameter that its cause depends on.
 //!
-//! The cause is what the gate found out about the faces at fault; the parameters are those of the steps that the mesh came
-//! through, nearest first.
+//! The cause is what the gate found out about the faces at fault; the parameters are those of the steps that the mesh
+//! came through, nearest first.
 
 use serde_json::Value as Json;
 

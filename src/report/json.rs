@@ -1,8 +1,9 @@
 //! `--json`: one shape of document for every command, for programs in any language.
 //!
-//! A document is an object with `kind` (`run`, `measure`, `diff`, `mesh-diff` or `sweep`), `units`, which gives the unit of
-//! each metric in it that has one, and the content of that kind. Measured values are plain numbers and truth values; a
-//! number that is not finite is null; where counting stopped, the number is a lower bound and its unit `or more`. `schemas/output.schema.json`, which `meshmill schema output` prints, is the schema.
+//! A document is an object with `kind` (`run`, `measure`, `diff`, `mesh-diff` or `sweep`), `units`, which gives the
+//! unit of each metric in it that has one, and the content of that kind. Measured values are plain numbers and truth
+//! values; a number that is not finite is null; where counting stopped, the number is a lower bound and its unit `or
+//! more`. `schemas/output.schema.json`, which `meshmill schema output` prints, is the schema.
 
 use std::collections::BTreeMap;
 

@@ -109,8 +109,8 @@ impl SweepTable {
         Ok(ron::ser::to_string_pretty(self, config)? + "\n")
     }
 
-    /// The table as comma-separated values: one line a case, a column a parameter or metric; gates have a second one that
-    /// says whether they hold.
+    /// The table as comma-separated values: one line a case, a column a parameter or metric; gates have a second one
+    /// that says whether they hold.
     pub fn to_csv(&self) -> Result<String, csv::Error> {
         let mut writer = csv::Writer::from_writer(Vec::new());
         let mut head = vec!["case".to_owned()];

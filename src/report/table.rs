@@ -174,7 +174,8 @@ pub fn text(table: &Table) -> String {
     lines.join("\n")
 }
 
-/// A paragraph as lines of at most 80 columns, each after `indent` blanks. A word longer than that has a line of its own.
+/// A paragraph as lines of at most 80 columns, each after `indent` blanks. A word longer than that has a line of its
+/// own.
 pub fn wrapped(text: &str, indent: usize) -> Vec<String> {
     const WIDTH: usize = 80;
     let mut lines: Vec<String> = Vec::new();

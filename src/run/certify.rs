@@ -160,8 +160,8 @@ impl Attempt {
     }
 }
 
-/// Each corner of the mesh and where its file has it. `None` where the faces of the file are not those of the mesh; formats
-/// may list triangles and quads apart.
+/// Each corner of the mesh and where its file has it. `None` where the faces of the file are not those of the mesh;
+/// formats may list triangles and quads apart.
 fn corners(soup: &Soup, file: &Soup) -> Option<Vec<(VertexId, DVec3)>> {
     let of = |soup: &Soup, corners: usize| -> Vec<FaceId> {
         let faces = soup.faces.enumerate().filter(|(_, facet)| facet.corners().len() == corners);

@@ -1,8 +1,9 @@
 //! One run at a time in a folder: files of two runs side by side would look like the result of one.
 //!
-//! The claim is the system's advisory lock on the folder itself, and a shared one on each folder above it, so that a run
-//! in `out` and one in `out/case` exclude each other while `out/a` and `out/b` do not. It ends with the process, however
-//! that ends, so nothing is left behind. Where a file system knows no such locks, there is no claim and nothing is said.
+//! The claim is the system's advisory lock on the folder itself, and a shared one on each folder above it, so that a
+//! run in `out` and one in `out/case` exclude each other while `out/a` and `out/b` do not. It ends with the process,
+//! however that ends, so nothing is left behind. Where a file system knows no such locks, there is no claim and nothing
+//! is said.
 
 use std::fs::{self, File, TryLockError};
 use std::path::{Path, PathBuf};

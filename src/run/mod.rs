@@ -135,8 +135,8 @@ pub fn write_file(path: &std::path::Path, bytes: &[u8]) -> Result<(), RunError> 
     whole::write(path, bytes).map_err(|source| RunError::Output { action: "write", path: path.to_path_buf(), source })
 }
 
-/// The same for a file that the user named: where that is a link, what it leads to is written, and a device or a pipe is
-/// written to as it is.
+/// The same for a file that the user named: where that is a link, what it leads to is written, and a device or a pipe
+/// is written to as it is.
 pub fn write_named(path: &std::path::Path, bytes: &[u8]) -> Result<(), RunError> {
     let written = whole::write_named(path, bytes);
     written.map_err(|source| RunError::Output { action: "write", path: path.to_path_buf(), source })

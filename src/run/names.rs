@@ -1,5 +1,5 @@
-//! Groups that later steps and gates need: looked for before a step works, so that a misspelt name does not cost the hours
-//! of the steps before the one that would miss it.
+//! Groups that later steps and gates need: looked for before a step works, so that a misspelt name does not cost the
+//! hours of the steps before the one that would miss it.
 
 use std::collections::BTreeSet;
 

@@ -7,8 +7,8 @@
 //!   "seams": [ { "patches": [0, 1], "angle": 0.5, "smooth": true } ] }
 //! ```
 //!
-//! Every patch is a clamped, non-rational B-spline surface of degree 3 by 3. `knots` holds the knot vectors along u and v
-//! with the ends four times; `controls` the rows of control points, one row for each control point along v, u running
+//! Every patch is a clamped, non-rational B-spline surface of degree 3 by 3. `knots` holds the knot vectors along u and
+//! v with the ends four times; `controls` the rows of control points, one row for each control point along v, u running
 //! inside a row. The side v = 1 of a `triangle` is a single point. Errors are distances in mesh units, angles degrees.
 
 use serde_json::json;

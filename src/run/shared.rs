@@ -55,8 +55,8 @@ impl<'a> Shared<'a> {
         }
     }
 
-    /// Saves an artifact. A cache that cannot be written costs the next run time, and this one nothing; it is told at the
-    /// end.
+    /// Saves an artifact. A cache that cannot be written costs the next run time, and this one nothing; it is told at
+    /// the end.
     pub(super) fn save(&self, artifact: &Artifact) -> Saved {
         let (saved, written) = self.store.save(artifact);
         self.note_unsaved(written);

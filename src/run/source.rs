@@ -1,8 +1,8 @@
 //! Files that a run reads, with those that they include: one content, one hash, and a list of all files behind it.
 //!
-//! A deck with includes counts as the deck with their lines in place, so that a change of any of them is a change of the
-//! input. A file is included by its name relative to the deck's folder, and only from below it: no path and no link leads
-//! out. All included files together have at most [`MOST_BYTES`].
+//! A deck with includes counts as the deck with their lines in place, so that a change of any of them is a change of
+//! the input. A file is included by its name relative to the deck's folder, and only from below it: no path and no link
+//! leads out. All included files together have at most [`MOST_BYTES`].
 
 use std::collections::BTreeSet;
 use std::io;

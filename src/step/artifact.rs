@@ -117,7 +117,8 @@ impl Artifact {
         }
     }
 
-    /// Any mesh, or the tessellation of patches, as a soup, for writers and metrics; `None` for files, hierarchies and metrics.
+    /// Any mesh, or the tessellation of patches, as a soup, for writers and metrics; `None` for files, hierarchies and
+    /// metrics.
     pub fn to_soup(&self) -> Option<Arc<Soup>> {
         match self {
             Self::Soup(soup) => Some(Arc::clone(soup)),

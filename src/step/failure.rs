@@ -87,8 +87,8 @@ impl StepFailure {
     }
 }
 
-/// A message without the number that the system adds to its errors: `No such file or directory (os error 2)` says it all
-/// before the parenthesis.
+/// A message without the number that the system adds to its errors: `No such file or directory (os error 2)` says it
+/// all before the parenthesis.
 pub fn without_code(message: &str) -> String {
     let mut text = String::with_capacity(message.len());
     let mut parts = message.split(" (os error ");

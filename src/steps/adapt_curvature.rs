@@ -3,18 +3,19 @@
 //! From a coarse front, nodes whose elements are larger than `largest · (1 − min(κ / κ_p, 1))^gamma` are split, with
 //! whatever must be split before them, until no face has a longer side than any of its vertices asks for.
 //!
-//! Based on: H. Date, S. Kanai, T. Kishinami, I. Nishigaki. Mesh Simplification and Adaptive LOD for Finite Element Mesh
-//! Generation, 2005, section 5.3.1.
+//! Based on: H. Date, S. Kanai, T. Kishinami, I. Nishigaki. Mesh Simplification and Adaptive LOD for Finite Element
+//! Mesh Generation, 2005, section 5.3.1.
 //!
 //! # Invariants
-//! Without `polish`, every face was seen while the hierarchy was recorded, so thresholds hold if they hold at the finest.
+//! Without `polish`, every face was seen while the hierarchy was recorded, so thresholds hold if they hold at the
+//! finest.
 //!
 //! # Cost
 //! O(n log n) in the nodes above the result; the reported distance costs more.
 //!
 //! # Departures
-//! `κ_p` is a percentile of the curvatures, not the largest, which one spike decides. The paper compares the mean size of a
-//! vertex's faces when it was made; here the longest side of every face counts as it is in the result.
+//! `κ_p` is a percentile of the curvatures, not the largest, which one spike decides. The paper compares the mean size
+//! of a vertex's faces when it was made; here the longest side of every face counts as it is in the result.
 
 use std::sync::Arc;
 
@@ -49,9 +50,9 @@ pub struct AdaptCurvatureParams {
     /// How sizes fall with curvature: 1 in proportion, above 1 faster, below 1 later. Default 1.
     #[schemars(range(min = 0.01, max = 100.0))]
     pub gamma: f64,
-    /// Betters the mesh by flips and relaxation, each certified: stretch, size and valence stay within what the mesh has
-    /// without it, and so does the distance from the finest mesh, which is itself off the reference of its simplification.
-    /// Its faces then are no longer those that were recorded. Default false.
+    /// Betters the mesh by flips and relaxation, each certified: stretch, size and valence stay within what the mesh
+    /// has without it, and so does the distance from the finest mesh, which is itself off the reference of its
+    /// simplification. Its faces then are no longer those that were recorded. Default false.
     pub polish: bool,
 }
 

@@ -3,11 +3,12 @@
 //! Every node has a reference size, from the front whose distribution is kept; the node whose size relative to that is
 //! largest is split, or smallest merged, until the number is reached.
 //!
-//! Based on: H. Date, S. Kanai, T. Kishinami, I. Nishigaki. Mesh Simplification and Adaptive LOD for Finite Element Mesh
-//! Generation, 2005, section 5.3.2.
+//! Based on: H. Date, S. Kanai, T. Kishinami, I. Nishigaki. Mesh Simplification and Adaptive LOD for Finite Element
+//! Mesh Generation, 2005, section 5.3.2.
 //!
 //! # Invariants
-//! Without `polish`, every face was seen while the hierarchy was recorded, so thresholds hold if they hold at the finest.
+//! Without `polish`, every face was seen while the hierarchy was recorded, so thresholds hold if they hold at the
+//! finest.
 //!
 //! # Cost
 //! O(n log n) in the nodes between the two fronts; the reported distance costs more.
@@ -49,9 +50,9 @@ pub struct AdaptDensityParams {
     /// mesh. With `like` it has no effect.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub base: Option<Resolution>,
-    /// Betters the mesh by flips and relaxation, each certified: stretch, size and valence stay within what the mesh has
-    /// without it, and so does the distance from the finest mesh, which is itself off the reference of its simplification.
-    /// Its faces then are no longer those that were recorded. Default false.
+    /// Betters the mesh by flips and relaxation, each certified: stretch, size and valence stay within what the mesh
+    /// has without it, and so does the distance from the finest mesh, which is itself off the reference of its
+    /// simplification. Its faces then are no longer those that were recorded. Default false.
     pub polish: bool,
 }
 

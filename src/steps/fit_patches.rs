@@ -2,15 +2,15 @@
 //!
 //! # Algorithm
 //! Curves over the common paths of elements come first, by least squares with both ends fixed; then the patches inside,
-//! by least squares over the covered vertices, and places on the faces where there are none, each by the area around it,
-//! with a thin-plate term and corrected parameters that start from mean value coordinates. Patches beyond the tolerance get
-//! twice the spans and more, where that helps.
-//! With `g1` both patches of a smooth seam are drawn into common tangent planes, as far as the tolerance allows, and get
-//! more spans where their seams still bend by more than two degrees. The work is done by `technique::patches`.
+//! by least squares over the covered vertices, and places on the faces where there are none, each by the area around
+//! it, with a thin-plate term and corrected parameters that start from mean value coordinates. Patches beyond the
+//! tolerance get twice the spans and more, where that helps. With `g1` both patches of a smooth seam are drawn into
+//! common tangent planes, as far as the tolerance allows, and get more spans where their seams still bend by more than
+//! two degrees. The work is done by `technique::patches`.
 //!
 //! Based on: T. Itoh, A. Yamada, T. Furuhata, K. Inoue, K. Shimada. Rough Quadrilateralation of Triangular Meshes via
-//! Belt-like Subregioning for Surface Reconstruction. IBM Research Report RT0354, 2000, section 4, which fits patches by
-//! least squares too, by a method published in Japanese only.
+//! Belt-like Subregioning for Surface Reconstruction. IBM Research Report RT0354, 2000, section 4, which fits patches
+//! by least squares too, by a method published in Japanese only.
 //!
 //! # Invariants
 //! - Neighbours share their boundary curve, so that there is no gap; the tessellation is conforming.
@@ -43,12 +43,14 @@ use crate::watch::Watch;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default, rename_all = "kebab-case")]
 pub struct FitPatchesParams {
-    /// A patch farther from the surface, or the surface from it, gets more spans. Default 0.2 % of the surface's diagonal.
+    /// A patch farther from the surface, or the surface from it, gets more spans. Default 0.2 % of the surface's
+    /// diagonal.
     pub tolerance: Length,
     /// Most spans of a patch in each direction. Default 8; 1 is a single Bezier patch.
     #[schemars(range(min = 1, max = 32))]
     pub max_spans: usize,
-    /// Weight of the thin-plate term against the vertices. Default 1e-6, which decides only what the vertices leave open.
+    /// Weight of the thin-plate term against the vertices. Default 1e-6, which decides only what the vertices leave
+    /// open.
     #[schemars(range(min = 0.0))]
     pub fairness: f64,
     /// Elements of the tessellation along each side of a patch. Default 4.
@@ -79,8 +81,8 @@ pub struct FitPatchesStats {
     pub triangles: usize,
     /// Control points of all patches.
     pub control_points: usize,
-    /// Largest distance between patches and surface, both ways: of covered vertices from the patches, and of 17 by 17 places
-    /// of each patch from the surface.
+    /// Largest distance between patches and surface, both ways: of covered vertices from the patches, and of 17 by 17
+    /// places of each patch from the surface.
     pub max_error: f64,
     /// Root of the mean square of the patches' errors.
     pub rms_error: f64,

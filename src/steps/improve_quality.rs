@@ -4,8 +4,8 @@
 //! Selective subdivision first, until no edge is longer than `max-edge`: the freedom that collapse needs. Then the
 //! collapse that improves its star most, relative to its size, again and again while the tolerance allows.
 //!
-//! Based on: H. Date, S. Kanai, T. Kishinami, I. Nishigaki, T. Dohi. High-Quality and Property Controlled Finite Element
-//! Mesh Generation From Triangular Meshes using the Multiresolution Technique. JCISE 5(4), 2005, section 4.
+//! Based on: H. Date, S. Kanai, T. Kishinami, I. Nishigaki, T. Dohi. High-Quality and Property Controlled Finite
+//! Element Mesh Generation From Triangular Meshes using the Multiresolution Technique. JCISE 5(4), 2005, section 4.
 //!
 //! # Invariants
 //! - Topology, marked curves and kept elements stay; no new self-intersection.
@@ -129,9 +129,9 @@ pub struct ImproveQualityStats {
     pub max_valence: usize,
     /// The tolerance in mesh units (their square in `quadric-sum` mode).
     pub tolerance: f64,
-    /// Certified upper bound of the two-sided distance to `reference`, in mesh units: the tolerance, or less where every
-    /// edit told how far it moved the surface, and 0 where there was none. Absent in the quadric modes, and where the
-    /// input was further away than the tolerance and could not be brought back.
+    /// Certified upper bound of the two-sided distance to `reference`, in mesh units: the tolerance, or less where
+    /// every edit told how far it moved the surface, and 0 where there was none. Absent in the quadric modes, and where
+    /// the input was further away than the tolerance and could not be brought back.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub distance_bound: Option<f64>,
     /// The finest end, where the output is the hierarchy; all other figures are then those of its coarsest front.

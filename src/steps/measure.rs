@@ -1,4 +1,5 @@
-//! Measures a mesh: every metric of the registry that is defined on it, and those against a reference where one is named.
+//! Measures a mesh: every metric of the registry that is defined on it, and those against a reference where one is
+//! named.
 //!
 //! The mesh is measured as it is: vertices are not welded, so that the two sides of a seam count as rims. The metrics'
 //! definitions stand in `metric`, one a row of its registry; the largest distance is a certified bound.

@@ -2,11 +2,11 @@
 //!
 //! # Algorithm
 //! Midpoints of all edges that are too long, and the faces between them cut to match, in rounds; the work is done by
-//! `technique::refine`. With `flips`, edges between faces of one plane are flipped before the first round and after each
-//! where that makes the least angle of the two faces larger.
+//! `technique::refine`. With `flips`, edges between faces of one plane are flipped before the first round and after
+//! each where that makes the least angle of the two faces larger.
 //!
-//! Based on: H. Date, S. Kanai, T. Kishinami, I. Nishigaki, T. Dohi. High-Quality and Property Controlled Finite Element
-//! Mesh Generation From Triangular Meshes using the Multiresolution Technique. JCISE 5(4), 2005, section 4.1.
+//! Based on: H. Date, S. Kanai, T. Kishinami, I. Nishigaki, T. Dohi. High-Quality and Property Controlled Finite
+//! Element Mesh Generation From Triangular Meshes using the Multiresolution Technique. JCISE 5(4), 2005, section 4.1.
 //!
 //! # Invariants
 //! - Shape, area, volume and Euler characteristic stay. With `flips` the surface moves by no more than coordinates in
@@ -18,8 +18,8 @@
 //! Linear in the faces made, times the logarithm of the longest edge over the limit.
 //!
 //! # Departures
-//! The paper only halves. The flat faces of CAD programs are fans of needles, and each needle would be cut to pieces of its
-//! own: eight times the faces on a ring of 448 needles, nearly all of them still thin.
+//! The paper only halves. The flat faces of CAD programs are fans of needles, and each needle would be cut to pieces of
+//! its own: eight times the faces on a ring of 448 needles, nearly all of them still thin.
 
 use std::sync::Arc;
 
@@ -47,9 +47,9 @@ pub struct RefineParams {
     #[serde(default = "max_faces")]
     #[schemars(range(min = 1))]
     pub max_faces: usize,
-    /// Whether edges between faces of one plane are flipped where that makes the least angle larger: the needles of flat
-    /// faces give way to fewer and better ones. The surface moves by no more than coordinates in single precision are
-    /// rounded, marks and groups stay, and vertex fields are linear over the new faces. Default false.
+    /// Whether edges between faces of one plane are flipped where that makes the least angle larger: the needles of
+    /// flat faces give way to fewer and better ones. The surface moves by no more than coordinates in single precision
+    /// are rounded, marks and groups stay, and vertex fields are linear over the new faces. Default false.
     #[serde(default)]
     pub flips: bool,
 }

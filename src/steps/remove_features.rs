@@ -3,12 +3,12 @@
 //! # Algorithm
 //! The marks of `features` say where faces end; rings of faces between circles are the sides of holes and bosses. Their
 //! faces go, their rims are filled without new vertices, and each fill is refined and improved alone; see
-//! `technique::defeature`. Bores that cross have no ring of their own: they are found as the openings of flat faces, and
-//! go together, as do bores and bosses with their roundings, whose openings end where the flat face does. A bore or boss of
-//! which a part is missing is listed, from a third of the turn on.
+//! `technique::defeature`. Bores that cross have no ring of their own: they are found as the openings of flat faces,
+//! and go together, as do bores and bosses with their roundings, whose openings end where the flat face does. A bore or
+//! boss of which a part is missing is listed, from a third of the turn on.
 //!
-//! Based on: H. Date, S. Kanai, T. Kishinami, I. Nishigaki, T. Dohi. High-Quality and Property Controlled Finite Element
-//! Mesh Generation From Triangular Meshes using the Multiresolution Technique. JCISE 5(4), 2005, section 6.3.2.
+//! Based on: H. Date, S. Kanai, T. Kishinami, I. Nishigaki, T. Dohi. High-Quality and Property Controlled Finite
+//! Element Mesh Generation From Triangular Meshes using the Multiresolution Technique. JCISE 5(4), 2005, section 6.3.2.
 //!
 //! # Invariants
 //! - Faces that belong to no removed feature, and the vertices of rims, stay as they are.
@@ -39,14 +39,14 @@ const LISTED: usize = 500;
 /// Removes through holes, blind holes and bosses below a diameter, and fills their place.
 ///
 /// Use it after `features`, whose marks it needs: without marks it finds nothing. Chamfers, roundings, countersinks and
-/// counterbores go with their hole, and bores that cross go together; slots and other openings that are not round stay, and
-/// so do bores that break out at their side. What stays is listed with its place and the reason.
+/// counterbores go with their hole, and bores that cross go together; slots and other openings that are not round stay,
+/// and so do bores that break out at their side. What stays is listed with its place and the reason.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct RemoveFeaturesParams {
     /// Features up to this diameter are removed; of a stepped hole its widest step counts, up to three times the hole's
-    /// width, chamfers and roundings do not: a hole in the floor of a wider pocket is a feature of its own. Percents refer to
-    /// the diagonal of `from`.
+    /// width, chamfers and roundings do not: a hole in the floor of a wider pocket is a feature of its own. Percents
+    /// refer to the diagonal of `from`.
     pub max_diameter: Length,
     /// What is removed: `"through-holes"`, `"blind-holes"`, `"bosses"`. Default: both sorts of holes.
     #[serde(default = "holes")]

@@ -2,12 +2,12 @@
 //!
 //! The recorded collapses are done in their order until one more would leave fewer faces than asked for.
 //!
-//! Based on: H. Date, S. Kanai, T. Kishinami, I. Nishigaki. Mesh Simplification and Adaptive LOD for Finite Element Mesh
-//! Generation, 2005, section 5.
-//! Based on: H. Hoppe. Progressive meshes, SIGGRAPH 1996.
+//! Based on: H. Date, S. Kanai, T. Kishinami, I. Nishigaki. Mesh Simplification and Adaptive LOD for Finite Element
+//! Mesh Generation, 2005, section 5. Based on: H. Hoppe. Progressive meshes, SIGGRAPH 1996.
 //!
 //! # Invariants
-//! - Without `polish`, every face was seen while the hierarchy was recorded, so thresholds hold if they hold at the finest.
+//! - Without `polish`, every face was seen while the hierarchy was recorded, so thresholds hold if they hold at the
+//!   finest.
 //! - The share `"100%"` is the finest mesh bit for bit.
 //!
 //! # Cost
@@ -38,9 +38,9 @@ pub struct ResolutionParams {
     /// The same as a share of the finest mesh's faces, such as `"25%"`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub share: Option<Share>,
-    /// Betters the mesh by flips and relaxation, each certified: stretch, size and valence stay within what the mesh has
-    /// without it, and so does the distance from the finest mesh, which is itself off the reference of its simplification.
-    /// Its faces then are no longer those that were recorded. Default false.
+    /// Betters the mesh by flips and relaxation, each certified: stretch, size and valence stay within what the mesh
+    /// has without it, and so does the distance from the finest mesh, which is itself off the reference of its
+    /// simplification. Its faces then are no longer those that were recorded. Default false.
     pub polish: bool,
 }
 

@@ -3,17 +3,17 @@
 //! # Algorithm
 //! Strips of triangles grow from all borders at once; a graph of them is simplified to belts. The outer loop of a belt
 //! gets nodes at even distances, connectors run from them straight across to the inner loop, and what lies between two
-//! of them is an element: a quad, or a triangle where two connectors meet. A belt with several holes has them joined, one
-//! without gets a hole without area: a central node or path. Then triangles are coupled, and a triangle that touches the
-//! rim with one corner is opened to a quad. The belts are the work of `technique::belts`, the complex that they become
-//! that of `technique::layout`.
+//! of them is an element: a quad, or a triangle where two connectors meet. A belt with several holes has them joined,
+//! one without gets a hole without area: a central node or path. Then triangles are coupled, and a triangle that
+//! touches the rim with one corner is opened to a quad. The belts are the work of `technique::belts`, the complex that
+//! they become that of `technique::layout`.
 //!
 //! Based on: T. Itoh, A. Yamada, T. Furuhata, K. Inoue, K. Shimada. Rough Quadrilateralation of Triangular Meshes via
 //! Belt-like Subregioning for Surface Reconstruction. IBM Research Report RT0354, 2000.
 //!
-//! Where elements do not fit between the edges of the mesh, faces there are cut in four below the complex, which stays as
-//! it is, or before the belts are made again where these are no disks; the cover says which ones, so that nobody needs
-//! the finer mesh.
+//! Where elements do not fit between the edges of the mesh, faces there are cut in four below the complex, which stays
+//! as it is, or before the belts are made again where these are no disks; the cover says which ones, so that nobody
+//! needs the finer mesh.
 //!
 //! # Invariants
 //! - Nodes are vertices of the surface, edges are paths over its edges, and paths never cross.
@@ -29,10 +29,10 @@
 //!   thickness asked for; the graph then merges what is left over.
 //! - Elements are bounded by paths over edges. A connector is the path that hugs the straight walk, and of a fan every
 //!   second spoke is drawn, as if its triangles were coupled at once: few edges meet in a vertex.
-//! - Closed surfaces, which the paper leaves open, are cut along the borders of their regions. The nodes there are dealt
-//!   out first, so that every region has an even number of them: an odd one leaves a triangle.
-//! - Loops that are sampled freely get an even number of nodes for the same reason, and holes smaller than a few elements
-//!   get theirs before connectors come to them, at least four.
+//! - Closed surfaces, which the paper leaves open, are cut along the borders of their regions. The nodes there are
+//!   dealt out first, so that every region has an even number of them: an odd one leaves a triangle.
+//! - Loops that are sampled freely get an even number of nodes for the same reason, and holes smaller than a few
+//!   elements get theirs before connectors come to them, at least four.
 //! - A corner whose angle lies between two numbers of right angles takes either number of elements; so does a node on a
 //!   border that is coarse beside its curve, as round a small hole.
 //! - Where too many vertices are irregular, the interval is shortened step by step to three fifths.
@@ -57,14 +57,14 @@ use crate::watch::{Cancelled, Watch};
 
 /// Cuts a surface into coarse quads that follow its borders, each with the faces that it covers.
 ///
-/// The surface should be fine: ten edges or more along an element, see `refine`; where it has no room for an element its
-/// faces are cut in four. A closed surface must have regions. Needles, which CAD programs make of flat faces, become many
-/// times the faces that elements need and slow the work down: `refine` with `flips` evens them out.
+/// The surface should be fine: ten edges or more along an element, see `refine`; where it has no room for an element
+/// its faces are cut in four. A closed surface must have regions. Needles, which CAD programs make of flat faces,
+/// become many times the faces that elements need and slow the work down: `refine` with `flips` evens them out.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default, rename_all = "kebab-case")]
 pub struct RoughQuadsParams {
-    /// How far apart the nodes on borders lie, which is about the size of the elements. Default 6 % of the diagonal. With
-    /// `optimize` shorter ones, down to half, are tried where too many vertices would be irregular.
+    /// How far apart the nodes on borders lie, which is about the size of the elements. Default 6 % of the diagonal.
+    /// With `optimize` shorter ones, down to half, are tried where too many vertices would be irregular.
     pub interval: Length,
     /// How thick belts are: a length, or strips of triangles as a table `{ strips = 8 }`. Default: as `interval`.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -217,9 +217,9 @@ fn finish(surface: &Surface, made: Attempt) -> (Quads, RoughQuadsStats) {
     (quads, stats)
 }
 
-/// In which ways belts are cut: their order, how near connectors join a node, and how many times as far apart nodes lie.
-/// Shorter intervals come last: where limbs or holes are hardly wider than one element, there is no regular layout of
-/// elements of the size asked for.
+/// In which ways belts are cut: their order, how near connectors join a node, and how many times as far apart nodes
+/// lie. Shorter intervals come last: where limbs or holes are hardly wider than one element, there is no regular layout
+/// of elements of the size asked for.
 const WAYS: [(Order, f64, f64); 8] = [
     (Order::FromOutside, SNAP, 1.0),
     (Order::FromBorders, 0.5, 1.0),
@@ -255,8 +255,8 @@ fn best(surface: &Surface, rules: &BeltRules, watch: &Watch) -> Result<Result<At
     Ok(best.map(|best| best.1).ok_or(narrow))
 }
 
-/// The shares of triangles and of irregular vertices beside those that are good enough: up to 1 another way is not worth
-/// its time.
+/// The shares of triangles and of irregular vertices beside those that are good enough: up to 1 another way is not
+/// worth its time.
 fn excess(counts: &Counts, elements: usize) -> [f64; 2] {
     /// Shares that the paper's own examples keep.
     const GOOD: [f64; 2] = [0.03, 0.1];
@@ -266,11 +266,12 @@ fn excess(counts: &Counts, elements: usize) -> [f64; 2] {
     [(share(*triangles, elements) / GOOD[0]).max(1.0), share(irregular.len(), *vertices) / bar]
 }
 
-/// How near to a node, as a share of the interval, a connector joins it; less leaves rows apart that should be one, more
-/// makes rows meet that should run on.
+/// How near to a node, as a share of the interval, a connector joins it; less leaves rows apart that should be one,
+/// more makes rows meet that should run on.
 const SNAP: f64 = 0.4;
 
-/// Squares of the interval that an element made by optimisation may hold, unless those before held more: three by three.
+/// Squares of the interval that an element made by optimisation may hold, unless those before held more: three by
+/// three.
 const LARGEST: f64 = 9.0;
 
 /// Elements that a face of the mesh may be cut for.

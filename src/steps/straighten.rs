@@ -7,9 +7,9 @@
 //! that cross, or have other regions on their sides, get their old course back.
 //!
 //! Based on: R. Miyazaki, K. Harada. Transformation of a closed 3D triangular mesh to a quadrilateral mesh based on
-//! feature edges, section 3.2; D. Martínez, L. Velho, P. C. Carvalho. Computing geodesics on triangular meshes. Computers
-//! & Graphics 29(5), 2005; N. Sharp, K. Crane. You can find geodesic paths in triangle meshes by just flipping edges. ACM
-//! Transactions on Graphics 39(6), 2020.
+//! feature edges, section 3.2; D. Martínez, L. Velho, P. C. Carvalho. Computing geodesics on triangular meshes.
+//! Computers & Graphics 29(5), 2005; N. Sharp, K. Crane. You can find geodesic paths in triangle meshes by just
+//! flipping edges. ACM Transactions on Graphics 39(6), 2020.
 //!
 //! # Invariants
 //! - Points, faces and labels stay; curves are added, one for each arc.
@@ -59,8 +59,8 @@ const MOST_TRIALS: usize = 16;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default, rename_all = "kebab-case")]
 pub struct StraightenParams {
-    /// How: `"unfold"` (default) smooths in sweeps as the paper does, `"flip-geodesic"` makes each border as straight as
-    /// it can be on the surface.
+    /// How: `"unfold"` (default) smooths in sweeps as the paper does, `"flip-geodesic"` makes each border as straight
+    /// as it can be on the surface.
     pub method: Method,
     /// Sweeps over the points of all borders; with `flip-geodesic` sweeps that smooth the places where borders were
     /// held. Default 8. More is straighter, not better: straight borders leave round shapes.

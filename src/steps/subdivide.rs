@@ -4,8 +4,8 @@
 //! All edges are halved, and each face becomes the one between its midpoints and three at its corners; the work is done
 //! by `technique::refine`.
 //!
-//! Based on: H. Date, S. Kanai, T. Kishinami, I. Nishigaki, T. Dohi. High-Quality and Property Controlled Finite Element
-//! Mesh Generation From Triangular Meshes using the Multiresolution Technique. JCISE 5(4), 2005, section 5.1.
+//! Based on: H. Date, S. Kanai, T. Kishinami, I. Nishigaki, T. Dohi. High-Quality and Property Controlled Finite
+//! Element Mesh Generation From Triangular Meshes using the Multiresolution Technique. JCISE 5(4), 2005, section 5.1.
 //!
 //! # Invariants
 //! - Shape, area, volume and Euler characteristic stay.

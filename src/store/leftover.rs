@@ -15,8 +15,8 @@ const SUFFIX: &str = ".tmp";
 /// Leftovers of other machines go when they are this old.
 const STALE: Duration = Duration::from_hours(24);
 
-/// Writes `bytes` to a temporary file in `folder` and renames it to `path`, on the same file system. A link at `path` is
-/// replaced, not followed. Where anything fails, the temporary file is removed.
+/// Writes `bytes` to a temporary file in `folder` and renames it to `path`, on the same file system. A link at `path`
+/// is replaced, not followed. Where anything fails, the temporary file is removed.
 pub fn write_by_rename(folder: &Path, path: &Path, bytes: &[u8]) -> io::Result<()> {
     let prefix = format!("{PREFIX}{}-{}-", host(), std::process::id());
     let mut builder = tempfile::Builder::new();

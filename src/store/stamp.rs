@@ -4,8 +4,8 @@
 //! tasks that is up to date costs one small file and a stat a file. A stamp is a short cut and never a source: whatever
 //! is not exactly as it was is looked at task by task.
 //!
-//! What a run reads is seen before it is read ([`Seen`]), and is in the stamp only where it is still the same at the end:
-//! a file that was replaced while the run went on belongs to no stamp, and the next run looks at it.
+//! What a run reads is seen before it is read ([`Seen`]), and is in the stamp only where it is still the same at the
+//! end: a file that was replaced while the run went on belongs to no stamp, and the next run looks at it.
 //!
 //! As in the index of file hashes, a file that was modified just before its stat was taken is not trusted, since it may
 //! have changed again within the resolution of its clock: twenty milliseconds where times have fractions of a second,

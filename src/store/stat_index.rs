@@ -1,11 +1,11 @@
 //! Content hashes of files by their stat, so that an unchanged file is not hashed twice.
 //!
-//! A hash is trusted while path, size, times of modification and change (in nanoseconds), device and inode are the same.
-//! Links are followed for the stat and not for the path: to tell where each of ten thousand files really lies costs more
-//! than its stat, and a link that now leads elsewhere leads to another inode.
-//! As in Git's index, a file that was modified within two seconds before it was hashed is not trusted: it may have changed again within
-//! the resolution of the file system's clock. One small file a machine, replaced atomically; of two processes that
-//! write at once one loses its additions, which costs a hashing later and nothing else.
+//! A hash is trusted while path, size, times of modification and change (in nanoseconds), device and inode are the
+//! same. Links are followed for the stat and not for the path: to tell where each of ten thousand files really lies
+//! costs more than its stat, and a link that now leads elsewhere leads to another inode. As in Git's index, a file that
+//! was modified within two seconds before it was hashed is not trusted: it may have changed again within the resolution
+//! of the file system's clock. One small file a machine, replaced atomically; of two processes that write at once one
+//! loses its additions, which costs a hashing later and nothing else.
 
 use std::collections::BTreeMap;
 use std::fs;

@@ -1,10 +1,11 @@
 //! Where the vertex of a star gives its faces an aspect ratio of one, in the least squares of Zhang et al. 2009.
 //!
 //! For each rim edge the distance from its midpoint `c` should be the height `h = √3/2 · l` of the equilateral triangle
-//! on it: `|X − c|² = h²`. Of these equations (8 and 9 of the paper) the mean is subtracted, which makes them linear, without
-//! the arbitrary one that the paper subtracts (10). The printed signs of the lengths are wrong, and so is the height:
-//! `α = √3/2`. The point then is sought on the edge or face that collapses by constrained least squares of `A X = Y`:
-//! the paper puts the edge into the solution (12), which is solved already, and which is singular where the rim is flat.
+//! on it: `|X − c|² = h²`. Of these equations (8 and 9 of the paper) the mean is subtracted, which makes them linear,
+//! without the arbitrary one that the paper subtracts (10). The printed signs of the lengths are wrong, and so is the
+//! height: `α = √3/2`. The point then is sought on the edge or face that collapses by constrained least squares of `A X
+//! = Y`: the paper puts the edge into the solution (12), which is solved already, and which is singular where the rim
+//! is flat.
 
 use glam::DVec3;
 

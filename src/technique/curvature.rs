@@ -2,8 +2,8 @@
 //!
 //! The curvature tensor of a vertex is averaged over the ball `B` of a given radius about it:
 //! `T = 1/|B| · Σ β(e) · |e ∩ B| · ē ēᵀ`, where `β` is the signed bend of an edge (positive where convex), `ē` its unit
-//! direction and `|e ∩ B|` its length inside the ball. The eigenvector of the eigenvalue nearest to zero is close to the
-//! normal; the other two values are the principal curvatures, each with the direction of the *other* eigenvector,
+//! direction and `|e ∩ B|` its length inside the ball. The eigenvector of the eigenvalue nearest to zero is close to
+//! the normal; the other two values are the principal curvatures, each with the direction of the *other* eigenvector,
 //! because an edge bends the surface across itself.
 //!
 //! Based on: D. Cohen-Steiner, J.-M. Morvan. *Restricted Delaunay triangulations and normal cycle*, SoCG 2003;

@@ -79,8 +79,8 @@ pub fn raises(pair: &Pair, measure: impl Fn([DVec3; 3]) -> f64) -> bool {
     worst(pair.after()) > GAIN * worst(pair.before())
 }
 
-/// Flips edges of flat pairs of faces at the vertices from number `first` on while the worse face gets better in stretch.
-/// Returns how many were flipped.
+/// Flips edges of flat pairs of faces at the vertices from number `first` on while the worse face gets better in
+/// stretch. Returns how many were flipped.
 ///
 /// # Errors
 /// See [`FlipError`].

@@ -7,9 +7,9 @@
 //! taken, of equals the shorter one, of equals the one with the smaller vertex.
 //!
 //! Invariants: shape, area, volume, Euler characteristic and rims; every face lies in its parent, every vertex stays.
-//! Midpoints are rounded, so where two sides of a sheet are nearer than the rounding of their coordinates, faces may come
-//! to intersect. Groups, regions and marks are inherited; a midpoint joins the vertex groups of both its ends; vertex fields are
-//! linear, face fields constant in the parent. Copies of a seam edge get one new seam id. O(F log F).
+//! Midpoints are rounded, so where two sides of a sheet are nearer than the rounding of their coordinates, faces may
+//! come to intersect. Groups, regions and marks are inherited; a midpoint joins the vertex groups of both its ends;
+//! vertex fields are linear, face fields constant in the parent. Copies of a seam edge get one new seam id. O(F log F).
 
 use glam::DVec3;
 use rustc_hash::FxHashMap;

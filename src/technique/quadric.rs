@@ -1,9 +1,9 @@
 //! Quadrics: sums of squared distances to planes and lines as one small polynomial, and their minimisers.
 //!
 //! A quadric is `d(x) = x·A x + 2 b·x + c` (Garland and Heckbert, Surface Simplification Using Quadric Error Metrics,
-//! SIGGRAPH 1997). Lines of sharp edges are added as Date et al. do (High-Quality and Property Controlled Finite Element
-//! Mesh Generation From Triangular Meshes Using the Multiresolution Technique, JCISE 2005, equations 2 to 4), with the
-//! sign that makes `A` of a line the projector `I − d dᵀ` and its constant the squared distance of the origin.
+//! SIGGRAPH 1997). Lines of sharp edges are added as Date et al. do (High-Quality and Property Controlled Finite
+//! Element Mesh Generation From Triangular Meshes Using the Multiresolution Technique, JCISE 2005, equations 2 to 4),
+//! with the sign that makes `A` of a line the projector `I − d dᵀ` and its constant the squared distance of the origin.
 //!
 //! Invariants: `d(x) ≥ 0` (tiny negatives from rounding are cut); the trace of a unit-weight plane is 1 and that of a
 //! line is twice its weight, so that a mean over planes needs no counter.

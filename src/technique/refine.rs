@@ -12,8 +12,8 @@
 //! would never end; with it the triangle on a stuck edge is final once its third corner is low over the middle half.
 //! Cost: linear in the faces made, times the logarithm of the longest edge over the limit.
 //!
-//! Departure: edges between faces of one plane may be flipped before and between rounds, see [`Flips`]. The flat faces of
-//! CAD programs are fans of needles, each of which would be halved to pieces of its own.
+//! Departure: edges between faces of one plane may be flipped before and between rounds, see [`Flips`]. The flat faces
+//! of CAD programs are fans of needles, each of which would be halved to pieces of its own.
 
 mod count;
 mod flips;

@@ -1,5 +1,6 @@
 //! Random damage to stored artifacts, and whole recipes on random tiny meshes: never a panic, and what is accepted is
-//! right. Readers have theirs in `tests/formats/damage.rs`; `tests/mutants.py` does the same through the program with limits.
+//! right. Readers have theirs in `tests/formats/damage.rs`; `tests/mutants.py` does the same through the program with
+//! limits.
 //!
 //! `MESHMILL_FUZZ=20` looks at twenty times as many; the same number looks at the same ones.
 
@@ -121,7 +122,8 @@ fn soup(random: &mut Random) -> String {
     text
 }
 
-/// Recipes that make something of any mesh. What they cannot work on they refuse; what they write is checked by its gates.
+/// Recipes that make something of any mesh. What they cannot work on they refuse; what they write is checked by its
+/// gates.
 #[test]
 fn whole_recipes_end_on_random_tiny_meshes() {
     let folder = tempfile::tempdir().unwrap();

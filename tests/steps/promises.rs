@@ -49,8 +49,8 @@ fn sizes(mesh: &Soup) -> Vec<(DVec3, f64)> {
         .collect()
 }
 
-/// The mean size in rings about the hole, the innermost first: distance from the rim of the hole, and size. Single faces
-/// scatter about their size; rings do not.
+/// The mean size in rings about the hole, the innermost first: distance from the rim of the hole, and size. Single
+/// faces scatter about their size; rings do not.
 fn rings(mesh: &Soup) -> Vec<(f64, f64)> {
     let mut all: Vec<Vec<(f64, f64)>> = vec![Vec::new(); 12];
     for (middle, size) in sizes(mesh) {
@@ -115,7 +115,8 @@ fn quads_stay_within_their_tolerances_and_cross_nothing() {
 
 #[test]
 fn sizes_of_quads_grow_no_faster_than_the_gradation() {
-    // Quads come out up to twice as large as the sizes wanted; without gradation they would be four times as large here.
+    // Quads come out up to twice as large as the sizes wanted; without gradation they would be four times as large
+    // here.
     const SLACK: f64 = 2.2;
     let before = marked(&plate_with_a_small_hole());
     for gradation in [0.1, 0.2] {

@@ -159,8 +159,8 @@ fn chained(part: Soup, parameters: &str) -> (Arc<Quads>, Value) {
 
 #[test]
 fn walls_of_bores_are_meshed_however_coarse() {
-    // Needles from rim to rim have no vertex inside that knows where the wall looks. At this size the triangles that quads
-    // are made of came to span the bores, and a dozen quads were inverted after minutes.
+    // Needles from rim to rim have no vertex inside that knows where the wall looks. At this size the triangles that
+    // quads are made of came to span the bores, and a dozen quads were inverted after minutes.
     let part = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/examples/meshes/simple_part.stl"));
     let (quads, _) = chained(stl(part), "size = 1.249, tolerance = \"1%\", curve-tolerance = \"0.3%\"");
     let least = quad_shapes(&quads.mesh).column(|q| q.scaled_jacobian).iter().copied().fold(1.0, f64::min);
@@ -183,8 +183,8 @@ fn a_part_comes_within_the_tolerance_with_sound_shapes() {
 
 #[test]
 fn thin_walls_have_both_their_edges() {
-    // A wall as thick as a third of a percent of the part, which the tolerance would let pass for nothing: with one edge
-    // round its rim, the quads inside and outside passed through each other.
+    // A wall as thick as a third of a percent of the part, which the tolerance would let pass for nothing: with one
+    // edge round its rim, the quads inside and outside passed through each other.
     let ring = shapes::turned(64, [(1.0, 0.0), (1.0, 0.5), (0.99, 0.5), (0.99, 0.0)]);
     let (quads, stats) = chained(ring, "size = \"3%\", tolerance = \"0.3%\"");
     assert!(stats["min-scaled-jacobian"].as_f64().unwrap() > 0.5, "{stats}");

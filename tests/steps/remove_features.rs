@@ -16,12 +16,12 @@ fn the_hole_of_a_washer_goes() {
     assert_eq!(same.stats["through-holes"], 0, "a hole wider than asked stays");
 }
 
-/// How models were drilled: for a largest diameter, through holes, blind holes, and openings below it that are not round,
-/// or break out at their side, and stay.
+/// How models were drilled: for a largest diameter, through holes, blind holes, and openings below it that are not
+/// round, or break out at their side, and stay.
 type Drilled = (f64, [u64; 3]);
 
-/// The ring of 1.8 mm; seven screws of 3 mm, as the notch has cut the eighth; pivot and spindle, past four slots and the
-/// hollows below four beads.
+/// The ring of 1.8 mm; seven screws of 3 mm, as the notch has cut the eighth; pivot and spindle, past four slots and
+/// the hollows below four beads.
 const COVER: [Drilled; 3] = [(2.0, [6, 0, 0]), (3.2, [13, 0, 1]), (7.0, [15, 0, 9])];
 
 /// Microphone and screw bosses; the slots of the ear piece stay.

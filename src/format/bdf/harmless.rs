@@ -1,8 +1,8 @@
 //! Which cards of bulk data may be passed over, and which may not.
 //!
-//! A card that makes, copies or mirrors grid points or elements is refused by name: passed over, it would leave another mesh.
-//! Properties, materials, loads, constraints, matrices and tables are harmless. Elements that are not read, and cards that
-//! are neither, are passed over and named. After MSC Software, "MSC Nastran Quick Reference Guide".
+//! A card that makes, copies or mirrors grid points or elements is refused by name: passed over, it would leave another
+//! mesh. Properties, materials, loads, constraints, matrices and tables are harmless. Elements that are not read, and
+//! cards that are neither, are passed over and named. After MSC Software, "MSC Nastran Quick Reference Guide".
 
 /// Cards that make geometry from other cards: generators, superelements, p-version geometry.
 const MAKES_GEOMETRY: [&str; 14] = [

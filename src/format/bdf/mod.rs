@@ -3,13 +3,14 @@
 //! Cards after MSC Software, "MSC Nastran Quick Reference Guide", in short, long and free fields, with continuation
 //! lines and exponents without an `E`.
 //!
-//! Reading: CTRIA3, CTRIAR, CTRIA6, CQUAD4, CQUADR, CQUAD8, CSHEAR and their plane and axisymmetric kin become faces (of second-order elements only the corners
-//! are used), bars, beams, rods and plot elements edges of their property's group, solids are left out and counted, except where
-//! there is nothing else: then their skin is the mesh. Cards that make or mirror geometry are refused by name, other
-//! elements and cards that are not known to be harmless are passed over and named. Each property number is a face group, called as a comment `$HMNAME PROP 7"name"` says (the
-//! habit of several preprocessors), else `pid_7`. Grid points in a coordinate system of their own, or in the default one
-//! of `GRDSET`, are placed in the basic system. `INCLUDE` is followed where files are opened (see
-//! `format::include`), and refused here.
+//! Reading: CTRIA3, CTRIAR, CTRIA6, CQUAD4, CQUADR, CQUAD8, CSHEAR and their plane and axisymmetric kin become faces
+//! (of second-order elements only the corners are used), bars, beams, rods and plot elements edges of their property's
+//! group, solids are left out and counted, except where there is nothing else: then their skin is the mesh. Cards that
+//! make or mirror geometry are refused by name, other elements and cards that are not known to be harmless are passed
+//! over and named. Each property number is a face group, called as a comment `$HMNAME PROP 7"name"` says (the habit of
+//! several preprocessors), else `pid_7`. Grid points in a coordinate system of their own, or in the default one of
+//! `GRDSET`, are placed in the basic system. `INCLUDE` is followed where files are opened (see `format::include`), and
+//! refused here.
 //!
 //! Writing: long-field GRID cards of at most 16 characters a coordinate, which rounds some beyond their 13th digit; one
 //! property for each face group in name order, a face in several groups in the first of them, faces in none in a

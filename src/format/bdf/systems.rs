@@ -1,9 +1,9 @@
 //! Coordinate systems of a deck: grid points given in them become points of the basic system.
 //!
-//! Source: MSC Nastran Quick Reference Guide, `CORD1R`, `CORD1C`, `CORD1S`, `CORD2R`, `CORD2C`, `CORD2S`. A system has an origin
-//! A, a point B on its z axis and a point C in its half plane of x and z: three grid points (`CORD1x`), or nine numbers in
-//! another system (`CORD2x`). Coordinates are x, y, z; or r, θ, z; or r, θ from the z axis, φ; angles in degrees.
-//! Systems may be defined in any order and in each other, not in a circle. Cost: each system is found once.
+//! Source: MSC Nastran Quick Reference Guide, `CORD1R`, `CORD1C`, `CORD1S`, `CORD2R`, `CORD2C`, `CORD2S`. A system has
+//! an origin A, a point B on its z axis and a point C in its half plane of x and z: three grid points (`CORD1x`), or
+//! nine numbers in another system (`CORD2x`). Coordinates are x, y, z; or r, θ, z; or r, θ from the z axis, φ; angles
+//! in degrees. Systems may be defined in any order and in each other, not in a circle. Cost: each system is found once.
 
 use std::collections::BTreeMap;
 

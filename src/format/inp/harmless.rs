@@ -1,8 +1,8 @@
 //! Which cards of input files may be passed over, and which may not.
 //!
-//! A card that makes, copies, moves or joins nodes, elements or sets is refused by name: passed over, it would leave another
-//! mesh. A card about materials, sections, loads or output is harmless. What is neither is passed over and named.
-//! Names after the keyword references of Abaqus and CalculiX.
+//! A card that makes, copies, moves or joins nodes, elements or sets is refused by name: passed over, it would leave
+//! another mesh. A card about materials, sections, loads or output is harmless. What is neither is passed over and
+//! named. Names after the keyword references of Abaqus and CalculiX.
 
 /// Cards that create, copy, move or join nodes, elements or sets.
 pub(super) const MAKES_GEOMETRY: [&str; 10] = [

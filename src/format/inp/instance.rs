@@ -1,9 +1,9 @@
 //! Instances of parts: where they stand, and the nodes and elements that they bring.
 //!
-//! After Abaqus Keywords Reference Guide, `*INSTANCE`: the first data line moves the instance, the second turns what was
-//! moved about an axis through two points by an angle in degrees. The first instance of a part is made of its own nodes,
-//! further ones of copies behind all others; a part without an instance, in a file that has instances, is no part of the
-//! model and left out.
+//! After Abaqus Keywords Reference Guide, `*INSTANCE`: the first data line moves the instance, the second turns what
+//! was moved about an axis through two points by an angle in degrees. The first instance of a part is made of its own
+//! nodes, further ones of copies behind all others; a part without an instance, in a file that has instances, is no
+//! part of the model and left out.
 
 use std::ops::Range;
 
@@ -19,7 +19,8 @@ use super::read::{Reader, items};
 use super::sets::{Card, Sets};
 use crate::mesh::Soup;
 
-/// Instances may make so many nodes and elements for each one in the file; a hostile file could name a part without end.
+/// Instances may make so many nodes and elements for each one in the file; a hostile file could name a part without
+/// end.
 const MOST_COPIES: usize = 256;
 
 /// An instance of a part.
@@ -144,8 +145,8 @@ impl Reader<'_> {
         Ok((soup, counts))
     }
 
-    /// Moves the parts to where their first instances stand, adds the nodes of further ones, and says where the nodes and
-    /// elements of each scope are.
+    /// Moves the parts to where their first instances stand, adds the nodes of further ones, and says where the nodes
+    /// and elements of each scope are.
     fn place_instances(&mut self) -> Result<Vec<Shift>, FormatError> {
         let mut shifts = vec![Shift::default(); self.scopes.len()];
         let mut used = vec![false; self.scopes.len()];

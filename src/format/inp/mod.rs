@@ -6,12 +6,13 @@
 //! second-order element only the corners are used; beams and trusses become edges, masses vertices, where a set names
 //! them; other elements are left out and counted. `*ELSET` becomes a face group (and an edge group where it holds
 //! beams), `*NSET` a vertex group, `*SURFACE` a face group, of nodes a vertex group, of element sides `E1` to `E4` an
-//! edge group. Sets may list numbers, ranges (`GENERATE`) and other sets. Names are compared without regard to case, and
-//! keep the case of their first use. Parts have numbers of their own. Each instance of a part is moved, then turned, and has the sets of the part;
-//! where sets of two instances have one name, it follows the name of the instance and a point.
-//! A set named `Eall` or `Nall` that holds everything is no group. `*INCLUDE` is followed where files are opened (see `format::include`), and refused here. So are cards
-//! that make, copy or move nodes or elements, by name: passed over, they would leave another mesh. Cards that are neither
-//! read nor known to be harmless are passed over and named.
+//! edge group. Sets may list numbers, ranges (`GENERATE`) and other sets. Names are compared without regard to case,
+//! and keep the case of their first use. Parts have numbers of their own. Each instance of a part is moved, then
+//! turned, and has the sets of the part; where sets of two instances have one name, it follows the name of the instance
+//! and a point. A set named `Eall` or `Nall` that holds everything is no group. `*INCLUDE` is followed where files are
+//! opened (see `format::include`), and refused here. So are cards that make, copy or move nodes or elements, by name:
+//! passed over, they would leave another mesh. Cards that are neither read nor known to be harmless are passed over and
+//! named.
 //!
 //! Writing: nodes, elements by type in the set `Eall`, an `*ELSET` and a `*SURFACE` (positive side) for each face group
 //! and region, an `*NSET` for each vertex group and for the nodes of each edge group, since no solver agrees with

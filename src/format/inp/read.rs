@@ -24,7 +24,8 @@ const STRIDE: u64 = 1 << 16;
 /// Names of unknown cards that are kept.
 const MOST_UNKNOWN: usize = 1000;
 
-/// Numbers of one part, or of the assembly, which is the first scope; or an instance of a part, with the part's numbers.
+/// Numbers of one part, or of the assembly, which is the first scope; or an instance of a part, with the part's
+/// numbers.
 #[derive(Debug, Default)]
 pub(super) struct Scope {
     /// The name of the part or instance, empty outside both.

@@ -178,8 +178,8 @@ impl<'a> Sets<'a> {
         Ok(self.into_groups())
     }
 
-    /// Adds what a card holds to its set. A card that cannot be understood is left out whole and named, since half a set
-    /// under its full name would deceive; numbers that nobody has are left out of it, as the solvers do.
+    /// Adds what a card holds to its set. A card that cannot be understood is left out whole and named, since half a
+    /// set under its full name would deceive; numbers that nobody has are left out of it, as the solvers do.
     fn add(&mut self, card: Card, counts: &mut ReadCounts) -> Result<(), FormatError> {
         let what = || {
             let what = match card.kind {

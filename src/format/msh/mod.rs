@@ -5,18 +5,19 @@
 //! chapter of Gmsh's reference manual.
 //!
 //! Reading: triangles and quads of any order become faces (only corners are used), lines edges, points vertices;
-//! volumes are left out, except where there is nothing else: then their skin is the mesh, with their groups. A physical group becomes a face, edge or vertex group after its dimension, `physical_TAG` where
-//! it has no name. A file without physical groups gives its elementary entities as groups: `surface_TAG` where there
-//! are several surfaces, and `curve_TAG`. In version 2 an element of several groups is written once for each of them:
-//! elements of equal nodes and entity in different groups are one face. The pieces of a partitioned mesh count as the
-//! entities that they are pieces of; elements of an entity that the file does not define are an error. Node numbers may have gaps and any order;
+//! volumes are left out, except where there is nothing else: then their skin is the mesh, with their groups. A physical
+//! group becomes a face, edge or vertex group after its dimension, `physical_TAG` where it has no name. A file without
+//! physical groups gives its elementary entities as groups: `surface_TAG` where there are several surfaces, and
+//! `curve_TAG`. In version 2 an element of several groups is written once for each of them: elements of equal nodes and
+//! entity in different groups are one face. The pieces of a partitioned mesh count as the entities that they are pieces
+//! of; elements of an entity that the file does not define are an error. Node numbers may have gaps and any order;
 //! parameters of nodes are skipped. `NodeData` and `ElementData` become fields, of several time steps the last one.
 //!
 //! Writing: version 4.1 (`msh`) or 2.2 (`msh22`). Faces in the same groups are one entity; groups and regions are
-//! physical groups with names. In version 4.1 faces of no group are the physical group `(no group)` where there are groups
-//! at all, since some readers (meshio 5) want all elements in groups or none, and Gmsh itself saves only what is in one;
-//! reading takes it back. Faces keep their order. Fields are written padded with zeros to 3 or 9 components, the
-//! widths that Gmsh knows; wider ones, marks and pins are not written.
+//! physical groups with names. In version 4.1 faces of no group are the physical group `(no group)` where there are
+//! groups at all, since some readers (meshio 5) want all elements in groups or none, and Gmsh itself saves only what is
+//! in one; reading takes it back. Faces keep their order. Fields are written padded with zeros to 3 or 9 components,
+//! the widths that Gmsh knows; wider ones, marks and pins are not written.
 //!
 //! Linear in the size of the file.
 

@@ -1,12 +1,13 @@
 //! Legacy VTK (`.vtk`), text and binary: unstructured grids and polygonal data, versions 1 to 5.1.
 //!
-//! Layout after Schroeder, Martin, Lorensen: The Visualization Toolkit, 4th edition, 2006, chapter 12, and for version 5
-//! Kitware's release notes (cells as offsets and connectivity). What cells and arrays mean is told in [`model`], which
-//! the XML formats share. Binary numbers are big-endian, those of type `long` and `vtktypeint64` have 64 bits,
+//! Layout after Schroeder, Martin, Lorensen: The Visualization Toolkit, 4th edition, 2006, chapter 12, and for version
+//! 5 Kitware's release notes (cells as offsets and connectivity). What cells and arrays mean is told in [`model`],
+//! which the XML formats share. Binary numbers are big-endian, those of type `long` and `vtktypeint64` have 64 bits,
 //! `vtkIdType` has 32.
 //!
 //! Writing gives version 3.0, which all programs read, as an unstructured grid with its arrays in `FIELD`s. Lost: what
-//! the model does not tell (marks, pins), and the end of a header longer than 255 bytes. Linear in the size of the file.
+//! the model does not tell (marks, pins), and the end of a header longer than 255 bytes. Linear in the size of the
+//! file.
 
 mod describe;
 pub(super) mod model;

@@ -363,7 +363,8 @@ fn shape_of(kind: u8) -> Option<Shape> {
 /// The corners of a voxel in the order of a brick's.
 const VOXEL: [usize; 8] = [0, 1, 3, 2, 4, 5, 7, 6];
 
-/// How many of the first points of a volume cell are its corners, 0 where its sides are not known; `None` of other cells.
+/// How many of the first points of a volume cell are its corners, 0 where its sides are not known; `None` of other
+/// cells.
 fn volume_corners(kind: u8) -> Option<usize> {
     match kind {
         10 | 24 | 71 | 78 => Some(4),

@@ -4,9 +4,9 @@
 //! chapter 12). What the arrays mean is told in the model that the legacy format shares: groups, regions and fields
 //! come back as they were.
 //!
-//! Reading takes text, base64 inline and appended data in base64 or raw, zlib and LZ4 blocks, both byte orders and both widths
-//! of heads, several pieces, and all cell types: first and second order triangles and quads, polygons, strips and
-//! pixels are faces, lines are members of edge groups, volumes are left out.
+//! Reading takes text, base64 inline and appended data in base64 or raw, zlib and LZ4 blocks, both byte orders and both
+//! widths of heads, several pieces, and all cell types: first and second order triangles and quads, polygons, strips
+//! and pixels are faces, lines are members of edge groups, volumes are left out.
 //!
 //! A `.vtp` file has its lines before its faces, as the format orders them, and no quadratic cells, which it lacks.
 //!

@@ -1,8 +1,8 @@
 //! Face collapse: the three corners of a face become one vertex, in one transaction.
 //!
 //! It is the collapse of one side and then of the edge that the two others became; both must be admitted before the
-//! first is done. Topology: the link conditions of both, the second one on the mesh as the first leaves it, read off the
-//! stars as they are. Only inner faces with at most one corner that is not free: others are left to edge collapse.
+//! first is done. Topology: the link conditions of both, the second one on the mesh as the first leaves it, read off
+//! the stars as they are. Only inner faces with at most one corner that is not free: others are left to edge collapse.
 //! Invariants and freedom as in [`mod@super::collapse`]. Cost: O(valence).
 
 use super::collapse::{CollapsePlan, Placement, Ring, check_collapse, collapse};
@@ -65,7 +65,8 @@ fn has_mark(mesh: &HalfedgeMesh, v: VertexId) -> bool {
     mesh.outgoing(v).any(|h| mesh.edge_mark(edge_of(h)).is_some())
 }
 
-/// The second link condition, before the first collapse: `(N(i) ∪ N(j)) ∩ N(k)` are the two apexes beyond `jk` and `ki`.
+/// The second link condition, before the first collapse: `(N(i) ∪ N(j)) ∩ N(k)` are the two apexes beyond `jk` and
+/// `ki`.
 fn check_links(mesh: &HalfedgeMesh, h: HalfedgeId, corners: [VertexId; 3]) -> Result<(), Refusal> {
     let beyond = |side: HalfedgeId| mesh.apex(twin(side));
     let [third, second, first] = [beyond(h), beyond(mesh.next(h)), beyond(mesh.prev(h))];

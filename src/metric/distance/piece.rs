@@ -18,8 +18,8 @@ pub(super) struct Limits {
     radius: f64,
 }
 
-/// Pieces for a face that is the whole area, and for any: a large face may lie over all faces of the other mesh, so work
-/// goes by area. Keeps the worst case within minutes; a usual face needs one piece, or ten.
+/// Pieces for a face that is the whole area, and for any: a large face may lie over all faces of the other mesh, so
+/// work goes by area. Keeps the worst case within minutes; a usual face needs one piece, or ten.
 const PIECES_BY_AREA: f64 = 40e6;
 const FEWEST: usize = 2048;
 
@@ -178,8 +178,8 @@ fn cut(piece: &Piece, (centre, radius): (DVec3, f64), t: u32, to: &Target, accep
     parts
 }
 
-/// Splits a convex piece by a plane: what lies below, and what lies above. Triangle `t` is near the cut and serves as the
-/// first bound of the new corners' queries.
+/// Splits a convex piece by a plane: what lies below, and what lies above. Triangle `t` is near the cut and serves as
+/// the first bound of the new corners' queries.
 fn split(piece: &Piece, origin: DVec3, normal: DVec3, t: u32, to: &Target) -> (Piece, Piece) {
     let (mut below, mut above) = (Piece::new(), Piece::new());
     for (i, &c) in piece.iter().enumerate() {

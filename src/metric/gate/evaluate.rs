@@ -65,7 +65,8 @@ impl Bounds {
 
 /// Judges a mesh by all checks, in order.
 ///
-/// `reference` is the mesh that the checks compare with; percents of lengths are of its diagonal where a check names it.
+/// `reference` is the mesh that the checks compare with; percents of lengths are of its diagonal where a check names
+/// it.
 pub fn evaluate(
     mesh: &Soup,
     reference: Option<&Soup>,

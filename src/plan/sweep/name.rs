@@ -1,9 +1,9 @@
 //! Names of cases: folders that say what is special about them.
 //!
-//! A name depends on the values of its case alone, so that a case keeps its folder whatever else is in the sweep. A file
-//! is named by its path from the recipe's folder, `parts+bracket.stl` for `parts/bracket.stl`. Where a name cannot hold
-//! all of the values, as for a file elsewhere, a few digits of their hash stand at its end. Only cases of equal values
-//! are numbered.
+//! A name depends on the values of its case alone, so that a case keeps its folder whatever else is in the sweep. A
+//! file is named by its path from the recipe's folder, `parts+bracket.stl` for `parts/bracket.stl`. Where a name cannot
+//! hold all of the values, as for a file elsewhere, a few digits of their hash stand at its end. Only cases of equal
+//! values are numbered.
 
 use std::collections::BTreeSet;
 use std::path::{Component, Path};

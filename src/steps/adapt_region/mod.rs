@@ -3,20 +3,21 @@
 //! From a coarse front, nodes of the region whose elements are larger than wanted are split, with whatever must be
 //! split before them, until no face at a vertex of the region has a longer side than asked for.
 //!
-//! Based on: H. Date, S. Kanai, T. Kishinami, I. Nishigaki. Mesh Simplification and Adaptive LOD for Finite Element Mesh
-//! Generation, 2005, section 5.3.1.
+//! Based on: H. Date, S. Kanai, T. Kishinami, I. Nishigaki. Mesh Simplification and Adaptive LOD for Finite Element
+//! Mesh Generation, 2005, section 5.3.1.
 //!
 //! # Invariants
-//! Without `polish`, every face was seen while the hierarchy was recorded, so thresholds hold if they hold at the finest.
+//! Without `polish`, every face was seen while the hierarchy was recorded, so thresholds hold if they hold at the
+//! finest.
 //!
 //! # Cost
 //! O(n log n) in the nodes above the result; the reported distance costs more.
 //!
 //! # Departures
-//! The region is a set of vertices of the finest mesh, so that it keeps its shape however coarse the front is (the paper
-//! hands a wish down to the nearest child); a field of an analysis may give the sizes, which the paper leaves to future
-//! work. The paper compares the mean size of a vertex's faces when it was made, which lets single faces be several times
-//! larger; here the longest side of every face counts as it is in the result.
+//! The region is a set of vertices of the finest mesh, so that it keeps its shape however coarse the front is (the
+//! paper hands a wish down to the nearest child); a field of an analysis may give the sizes, which the paper leaves to
+//! future work. The paper compares the mean size of a vertex's faces when it was made, which lets single faces be
+//! several times larger; here the longest side of every face counts as it is in the result.
 
 mod params;
 mod region;

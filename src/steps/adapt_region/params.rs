@@ -57,8 +57,8 @@ pub struct AdaptRegionParams {
     /// The mesh to refine from: a number of faces or a percent of the finest mesh's. Default: the coarsest one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub base: Option<Resolution>,
-    /// Longest side of the faces at vertices of the region; percents refer to the diagonal. It is kept but for sides of the
-    /// finest mesh itself.
+    /// Longest side of the faces at vertices of the region; percents refer to the diagonal. It is kept but for sides of
+    /// the finest mesh itself.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub size: Option<Length>,
     /// The same relative to the elements of `base` at each place: 0.5 asks for half their size. Above 0, at most 1.
@@ -83,10 +83,11 @@ pub struct AdaptRegionParams {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub field: Option<String>,
     /// Pairs of a value of the field and the size of elements there, `[[100, "4%"], [200, "1%"]]`, by rising value.
-    /// Between two pairs sizes are interpolated; below the first one any size will do, above the last one its size holds.
+    /// Between two pairs sizes are interpolated; below the first one any size will do, above the last one its size
+    /// holds.
     pub field_sizes: Vec<(f64, Length)>,
-    /// Betters the mesh by flips and relaxation, each certified: stretch, size and valence stay within what the mesh has
-    /// without it, and so does the distance from the finest mesh, which is itself off the reference of its simplification.
-    /// Its faces then are no longer those that were recorded. Default false.
+    /// Betters the mesh by flips and relaxation, each certified: stretch, size and valence stay within what the mesh
+    /// has without it, and so does the distance from the finest mesh, which is itself off the reference of its
+    /// simplification. Its faces then are no longer those that were recorded. Default false.
     pub polish: bool,
 }

@@ -6,12 +6,13 @@
 //! between, under the same tests. Where the mean stretch ends slightly below the one asked for, because the repairs at
 //! the end cost more than was allowed for, all is done again with a higher aim, twice at most.
 //!
-//! Based on: H. Date, S. Kanai, T. Kishinami, I. Nishigaki, T. Dohi. High-Quality and Property Controlled Finite Element
-//! Mesh Generation From Triangular Meshes using the Multiresolution Technique. JCISE 5(4), 2005, section 5.
-//! Based on: H. Date, S. Kanai, T. Kishinami, I. Nishigaki. Mesh Simplification and Adaptive LOD for Finite Element Mesh
-//! Generation, 2005, section 4.
+//! Based on: H. Date, S. Kanai, T. Kishinami, I. Nishigaki, T. Dohi. High-Quality and Property Controlled Finite
+//! Element Mesh Generation From Triangular Meshes using the Multiresolution Technique. JCISE 5(4), 2005, section 5.
+//! Based on: H. Date, S. Kanai, T. Kishinami, I. Nishigaki. Mesh Simplification and Adaptive LOD for Finite Element
+//! Mesh Generation, 2005, section 4.
 //!
-//! The output `hierarchy` is the record of pure collapse under the same thresholds, see [`crate::technique::hierarchy`].
+//! The output `hierarchy` is the record of pure collapse under the same thresholds, see
+//! [`crate::technique::hierarchy`].
 //!
 //! # Invariants
 //! - Topology, marked curves and kept elements stay; no new self-intersection.
@@ -66,9 +67,9 @@ pub struct ControlPropertiesParams {
     /// floor for analysis, which means angles from 7 to 154 degrees.
     #[schemars(range(min = 0.0, max = 0.95))]
     pub min_stretch: f64,
-    /// Collapses end where the mean stretch would fall below this, with a margin for what optimisation gains after them;
-    /// where even the most careful ones end lower, it falls no further. Good meshes have 0.88. Default 0: goes on while
-    /// every element keeps its thresholds.
+    /// Collapses end where the mean stretch would fall below this, with a margin for what optimisation gains after
+    /// them; where even the most careful ones end lower, it falls no further. Good meshes have 0.88. Default 0: goes on
+    /// while every element keeps its thresholds.
     #[schemars(range(min = 0.0, max = 0.95))]
     pub mean_stretch: f64,
     /// Longest side of an element. Default: no limit.
@@ -89,8 +90,8 @@ pub struct ControlPropertiesParams {
     /// the pure collapse of the papers.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub optimize: Option<bool>,
-    /// What happens where a threshold cannot be reached: `"report"` names the faces in the statistics, `"error"` lets the
-    /// step fail. Default `"report"`.
+    /// What happens where a threshold cannot be reached: `"report"` names the faces in the statistics, `"error"` lets
+    /// the step fail. Default `"report"`.
     pub on_infeasible: OnInfeasible,
 }
 
@@ -179,8 +180,8 @@ pub fn control_properties(
     Ok((result, stats))
 }
 
-/// The mean stretch to ask for where coarsening has gone too far by little: how much repairs and the last rounds cost is
-/// only known when they are done. `None` where all is well, or more faces would not help.
+/// The mean stretch to ask for where coarsening has gone too far by little: how much repairs and the last rounds cost
+/// is only known when they are done. `None` where all is well, or more faces would not help.
 fn higher_mean(params: &ControlPropertiesParams, reached: f64, is_coarser: bool, spare: f64) -> Option<f64> {
     let missed = params.mean_stretch - reached;
     let may = optimises(params) && params.target_faces.is_none() && is_coarser;

@@ -20,8 +20,8 @@ pub enum Status {
     Satisfied,
     /// All thresholds hold, and the number of faces asked for is reached.
     TargetReached,
-    /// A threshold does not hold everywhere, or the number of faces was not reached; `violations` names the faces. Or the
-    /// mean stretch ended below the one asked for.
+    /// A threshold does not hold everywhere, or the number of faces was not reached; `violations` names the faces. Or
+    /// the mean stretch ended below the one asked for.
     Stuck,
 }
 
@@ -68,9 +68,9 @@ pub struct ControlPropertiesStats {
     pub violations: Vec<Violation>,
     /// The tolerance in mesh units (their square in `quadric-sum` mode).
     pub tolerance: f64,
-    /// Certified upper bound of the two-sided distance to `reference`, in mesh units: the tolerance, or less where every
-    /// edit told how far it moved the surface, and 0 where there was none. Absent in the quadric modes, and where the
-    /// input was further away than the tolerance and could not be brought back.
+    /// Certified upper bound of the two-sided distance to `reference`, in mesh units: the tolerance, or less where
+    /// every edit told how far it moved the surface, and 0 where there was none. Absent in the quadric modes, and where
+    /// the input was further away than the tolerance and could not be brought back.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub distance_bound: Option<f64>,
     /// The finest end, where the output is the hierarchy; all other figures are then those of its coarsest front.

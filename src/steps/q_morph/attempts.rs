@@ -1,9 +1,9 @@
 //! From the surface to clean quads, tried again with smaller sizes where distance or shapes are not good enough.
 //!
-//! Every attempt starts from an earlier one ([`search`](super::search)) and makes only those regions anew whose triangles
-//! changed. What is poor in it is meshed anew in small pieces ([`rework`](super::rework)): most parts need one to three
-//! attempts then. For the others all begins again with whole regions only: larger steps, that lead elsewhere. Pieces
-//! are for what is left then.
+//! Every attempt starts from an earlier one ([`search`](super::search)) and makes only those regions anew whose
+//! triangles changed. What is poor in it is meshed anew in small pieces ([`rework`](super::rework)): most parts need
+//! one to three attempts then. For the others all begins again with whole regions only: larger steps, that lead
+//! elsewhere. Pieces are for what is left then.
 
 use std::cell::{Cell, OnceCell};
 

@@ -68,8 +68,8 @@ fn edge_at(curve: &Curve, at: f64) -> [VertexId; 2] {
     [curve.vertices[i - 1], curve.vertices[i]]
 }
 
-/// A vertex belongs to the groups of the whole face that it lies on, or of the whole edge where it lies on a curve: to those
-/// of all its corners. The vertices nearest to those of a group belong to it too, so that none is lost.
+/// A vertex belongs to the groups of the whole face that it lies on, or of the whole edge where it lies on a curve: to
+/// those of all its corners. The vertices nearest to those of a group belong to it too, so that none is lost.
 fn carry_vertices(soup: &Soup, places: &[Place], ground: &Ground<'_>, carried: &mut Carried) {
     let groups = &ground.surface.carried.groups.vertices;
     if groups.is_empty() {

@@ -140,8 +140,8 @@ impl Check {
         Ok(faces_of(&found.pairs).into_iter().map(|f| faces[f.index()]).collect())
     }
 
-    /// The places where the mesh and the surface are farther apart than `tolerance`, by a witness in each face at fault,
-    /// in regions that are `awake`.
+    /// The places where the mesh and the surface are farther apart than `tolerance`, by a witness in each face at
+    /// fault, in regions that are `awake`.
     pub(super) fn beyond(
         &self,
         mesh: &Mixed,

@@ -67,8 +67,8 @@ pub(super) fn lack_of(mesh: &Mixed, faces: impl Iterator<Item = u32>, flaws: &Fl
     broken + CROSSING * flaws.crossing.len() as f64 + 4.0 * worst + poorest + (0.2 * poor).min(2.0)
 }
 
-/// What a face lacks from the shape that it could have, as a part of that: good, or as good as the curves that meet at its
-/// corners allow.
+/// What a face lacks from the shape that it could have, as a part of that: good, or as good as the curves that meet at
+/// its corners allow.
 pub(super) fn shortfall(mesh: &Mixed, f: u32) -> f64 {
     let quality = mesh.quality(f).max(0.0);
     if quality >= FAIR {

@@ -9,9 +9,9 @@
 //! itself: angles are those of the triangles, and vertices go back onto the region they belong to.
 //!
 //! Based on: R. Miyazaki, K. Harada. Transformation of a closed 3D triangular mesh to a quadrilateral mesh based on
-//! feature edges; S. J. Owen, M. L. Staten, S. A. Canann, S. Saigal. Advancing front quadrilateral meshing using triangle
-//! transformations. 7th International Meshing Roundtable, 1998. The cavities: G. Bunin. Non-local topological clean-up.
-//! 15th International Meshing Roundtable, 2006.
+//! feature edges; S. J. Owen, M. L. Staten, S. A. Canann, S. Saigal. Advancing front quadrilateral meshing using
+//! triangle transformations. 7th International Meshing Roundtable, 1998. The cavities: G. Bunin. Non-local topological
+//! clean-up. 15th International Meshing Roundtable, 2006.
 //!
 //! The distance between triangles and surface is certified both ways first, and sizes are lowered where it is too
 //! large. The same is done with the finished quads: where they are too far away, single vertices are moved over the
@@ -86,8 +86,8 @@ pub struct QMorphParams {
     /// Range 0 to 360.
     #[schemars(range(min = 0.0, max = 360.0))]
     pub size_curvature: f64,
-    /// Sizes are not lowered below this, except where nodes are closer. Length; default a quarter of the least `size`, and
-    /// a sixteenth where the distance needs it.
+    /// Sizes are not lowered below this, except where nodes are closer. Length; default a quarter of the least `size`,
+    /// and a sixteenth where the distance needs it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub min_size: Option<Length>,
     /// How much longer edges may get over a unit of length. Range 0.05 to 2, default 0.3.
@@ -104,9 +104,10 @@ pub struct QMorphParams {
     /// Whether there must be no triangle. Default true; false leaves one in each region with an odd number of border
     /// edges, and no curve gets an edge more for it.
     pub all_quad: bool,
-    /// How often the front may run over regions where distance or shapes are not good enough: two thirds of it with small
-    /// pieces about poor places meshed anew, and where that does not do, so often without and half as often with pieces
-    /// again; in all, with what begins otherwise, at most four times as often. Default 8; 1 takes what the first run gives.
+    /// How often the front may run over regions where distance or shapes are not good enough: two thirds of it with
+    /// small pieces about poor places meshed anew, and where that does not do, so often without and half as often with
+    /// pieces again; in all, with what begins otherwise, at most four times as often. Default 8; 1 takes what the first
+    /// run gives.
     #[schemars(range(min = 1, max = 1000))]
     pub attempts: usize,
     /// The step fails before it begins if the result would have more faces. Default 20 million.
@@ -173,8 +174,8 @@ pub struct QMorphStats {
     /// result is then the best that was reached. Larger sizes or tolerances leave less to do.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub work_limit_reached: bool,
-    /// The largest distance between quads and surface, certified both ways. Larger than `tolerance` where sizes must not
-    /// get small enough.
+    /// The largest distance between quads and surface, certified both ways. Larger than `tolerance` where sizes must
+    /// not get small enough.
     pub distance: f64,
     /// The largest distance between a curve and the edges on it.
     pub curve_distance: f64,

@@ -81,7 +81,8 @@ impl Patch {
         Self::of(mesh, disk, Vec::new())
     }
 
-    /// The same across curves. `None` where it meets none, or has a region in several pieces, which could come together.
+    /// The same across curves. `None` where it meets none, or has a region in several pieces, which could come
+    /// together.
     fn across(mesh: &Mixed, face: u32, draw: Draw) -> Option<Self> {
         let mut disk = Disk::across(mesh, face);
         let mut last = 0..1;
@@ -116,8 +117,8 @@ impl Patch {
         self.faces.iter().fold(self.seed, |sum, &f| sum.wrapping_add(sign(mesh, f)))
     }
 
-    /// Quads for the patch, with sizes inside times `scale`: a mesh of its own that begins with the vertices of the rim.
-    /// `None` where there is a triangle left, and as soon as it comes out too bad to become good.
+    /// Quads for the patch, with sizes inside times `scale`: a mesh of its own that begins with the vertices of the
+    /// rim. `None` where there is a triangle left, and as soon as it comes out too bad to become good.
     pub(super) fn remade(
         &self,
         mesh: &Mixed,
@@ -202,8 +203,8 @@ impl Patch {
         Some(patch)
     }
 
-    /// Puts quads made for the patch into its place, within an open transaction. Returns the new faces; `None` where they
-    /// do not fit, and the transaction must be rolled back.
+    /// Puts quads made for the patch into its place, within an open transaction. Returns the new faces; `None` where
+    /// they do not fit, and the transaction must be rolled back.
     pub(super) fn put_back(
         &self,
         mesh: &mut Mixed,
@@ -264,8 +265,8 @@ fn sag(mesh: &Mixed, ground: &Ground<'_>, h: u32) -> f64 {
     ground.curves[mesh.arc(h) as usize].sag(a.min(b), a.max(b))
 }
 
-/// The edges on curves inside a disk near a face that are not much shorter than its longest side, and whose thirds are not
-/// below `floor`.
+/// The edges on curves inside a disk near a face that are not much shorter than its longest side, and whose thirds are
+/// not below `floor`.
 fn long_edges(mesh: &Mixed, disk: &Disk, face: u32, floor: f64) -> Vec<u32> {
     let longest = mesh.sides(face).map(|h| mesh.length(h)).fold(0.0, f64::max);
     let is_inner = |h: u32| disk.contains(mesh.face(h)) && disk.contains(mesh.face(h ^ 1));

@@ -87,8 +87,8 @@ pub(super) fn sign(mesh: &Mixed, f: u32) -> u64 {
     hasher.finish()
 }
 
-/// The triangles of `mesh` in regions that changed, and the earlier quads in the others; and whether each region changed.
-/// `None` where nothing can be taken over.
+/// The triangles of `mesh` in regions that changed, and the earlier quads in the others; and whether each region
+/// changed. `None` where nothing can be taken over.
 pub(super) fn take_over(
     mesh: &Mixed,
     signs: &[u64],
@@ -116,8 +116,9 @@ pub(super) fn take_over(
     Some((glued, awake))
 }
 
-/// For each vertex of `mesh` on the border of a region at rest the vertex of `quads` in its place. Regions at rest whose
-/// curves do not fit those of regions awake are woken: quads made smaller have more vertices on curves than triangles.
+/// For each vertex of `mesh` on the border of a region at rest the vertex of `quads` in its place. Regions at rest
+/// whose curves do not fit those of regions awake are woken: quads made smaller have more vertices on curves than
+/// triangles.
 fn same_vertices(mesh: &Mixed, quads: &Mixed, ground: &Ground<'_>, awake: &mut [bool]) -> FxHashMap<u32, u32> {
     let (new, old) = (chains(mesh, ground), chains(quads, ground));
     let is = |region: u32, state: bool, awake: &[bool]| region != NONE && awake[region as usize] == state;

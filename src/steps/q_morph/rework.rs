@@ -28,7 +28,8 @@ const fn across(rings: usize, scale: f64, cuts: Cuts) -> Draw {
 
 /// What is tried for poor shapes.
 ///
-/// The first three succeed most often; of those across curves, where vertices of curves lie badly, each did on some part.
+/// The first three succeed most often; of those across curves, where vertices of curves lie badly, each did on some
+/// part.
 const FOR_SHAPE: [Draw; 12] = [
     inside(2, 1.0),
     inside(3, 1.0),

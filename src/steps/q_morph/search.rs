@@ -1,9 +1,9 @@
 //! Which attempt the next one starts from, and what it is asked for.
 //!
-//! Smaller faces in one region change its curves, and with them the regions beside it, for better or worse. So an attempt
-//! that is worse than the best is not thrown away at once: a few more go on from it and mend what it made worse. When they
-//! come to nothing, the next starts from the best again: still smaller faces are asked of regions that failed once, none of
-//! those that failed twice.
+//! Smaller faces in one region change its curves, and with them the regions beside it, for better or worse. So an
+//! attempt that is worse than the best is not thrown away at once: a few more go on from it and mend what it made
+//! worse. When they come to nothing, the next starts from the best again: still smaller faces are asked of regions that
+//! failed once, none of those that failed twice.
 
 use std::cmp::Ordering;
 
@@ -161,8 +161,8 @@ impl Asked {
         next
     }
 
-    /// Counts a failure, after an attempt that was not better, for the regions asked that did not get better or border on one
-    /// that got worse; for all where that is none.
+    /// Counts a failure, after an attempt that was not better, for the regions asked that did not get better or border
+    /// on one that got worse; for all where that is none.
     fn blame(&mut self, before: &[f64], after: Option<&[f64]>, ground: &Ground<'_>) {
         let is_worse = |r: usize| after.is_some_and(|after| after[r] > before[r]);
         let mut spoils = vec![false; before.len()];

@@ -151,8 +151,8 @@ impl Settler<'_, '_> {
         out
     }
 
-    /// The sum of squares of what distances exceed the calm part of the tolerance by, both ways, at samples; once it is at
-    /// least `bound`, anything above.
+    /// The sum of squares of what distances exceed the calm part of the tolerance by, both ways, at samples; once it is
+    /// at least `bound`, anything above.
     pub(super) fn excess(&self, v: u32, points: &[DVec3], bound: f64) -> f64 {
         let triangles = self.triangles_at(v);
         let calm = CALM * self.tolerance;

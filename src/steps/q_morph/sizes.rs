@@ -34,8 +34,8 @@ pub(super) fn set(mesh: &mut Mixed, surface: &Surface, params: &QMorphParams, sc
     Ok(())
 }
 
-/// The bend per length at each vertex, of smooth edges only: the sum over its edges of angle times length, over the area
-/// that belongs to them.
+/// The bend per length at each vertex, of smooth edges only: the sum over its edges of angle times length, over the
+/// area that belongs to them.
 fn curvatures(surface: &Surface) -> Vec<f64> {
     let edges = EdgeTable::new(surface);
     let mut bend = vec![0.0; surface.points.len()];

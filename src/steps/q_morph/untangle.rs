@@ -1,7 +1,7 @@
 //! A start from triangles that do not fold up at the ends of thin limbs.
 //!
-//! Triangles as large as a limb is thick span it: vertices put into their edges have no side of the body to go to, and the
-//! limb's end turns into itself. Smaller triangles made of these stay folded, so all begins again from the surface.
+//! Triangles as large as a limb is thick span it: vertices put into their edges have no side of the body to go to, and
+//! the limb's end turns into itself. Smaller triangles made of these stay folded, so all begins again from the surface.
 
 use glam::DVec3;
 
@@ -20,8 +20,8 @@ const FINER: f64 = 0.6;
 /// The part of the tolerance from which on a free vertex was left inside the body.
 const STRAY: f64 = 0.5;
 
-/// Triangles that do not fold up, of those that `make` gives where sizes are lowered at some places; the least folded ones
-/// where all do.
+/// Triangles that do not fold up, of those that `make` gives where sizes are lowered at some places; the least folded
+/// ones where all do.
 ///
 /// # Errors
 /// Those of `make`, and where the run was interrupted.

@@ -28,8 +28,8 @@ pub(super) struct Intersections {
 }
 
 impl Intersections {
-    /// Refuses faces that run through each other along so much that elements of `size` would do so in more than twice as
-    /// many places. Two faces meet along a line, or cover each other.
+    /// Refuses faces that run through each other along so much that elements of `size` would do so in more than twice
+    /// as many places. Two faces meet along a line, or cover each other.
     pub(super) fn spread(&self, size: f64, corners: impl Fn(FaceId) -> [DVec3; 3]) -> Result<(), RepairError> {
         let (mut expected, mut length) = (0.0, 0.0);
         let mut lines: Vec<(f64, u32, DVec3)> = Vec::new();

@@ -21,7 +21,8 @@
 //! O(F log F) time, O(F) memory.
 //!
 //! # Departures
-//! Sheets that hang on a solid are not dropped: they are cut off, listed as components, and `keep-components` drops them.
+//! Sheets that hang on a solid are not dropped: they are cut off, listed as components, and `keep-components` drops
+//! them.
 //!
 //! Guéziec and others stitch borders again after cutting; here faces are joined before the cut, in radial order, so
 //! that solids which touch come apart as solids and sheets go straight on.

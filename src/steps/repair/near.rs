@@ -11,8 +11,8 @@ const BESIDE: f64 = 0.01;
 /// Told where at least this share of the vertices on borders has a neighbour.
 const TELLING: f64 = 0.1;
 
-/// What is said of the borders of a repaired surface that lie beside each other; nothing where few do. Copies of a vertex
-/// at the very same place were cut apart on purpose, and do not count. O(n log n).
+/// What is said of the borders of a repaired surface that lie beside each other; nothing where few do. Copies of a
+/// vertex at the very same place were cut apart on purpose, and do not count. O(n log n).
 pub(super) fn beside_each_other(surface: &Surface) -> Option<String> {
     let reach = border_vertices(surface);
     let spots: Vec<[DVec3; 3]> = reach.iter().map(|&(vertex, _)| [surface.points[vertex]; 3]).collect();

@@ -25,9 +25,9 @@ pub(super) struct CutEdge {
 /// Joins the faces at every edge in pairs. An odd face out becomes a border.
 ///
 /// Where the faces alternate in direction round the edge, solids touch there, and each pair encloses material, so
-/// that the solids come apart. Elsewhere sheets meet. The faces of a part that has no open edge stay together, so that a
-/// fin which goes on flat from the wall of a box does not open the box; then the flattest pairs go on into each other: of
-/// three plates the straight two.
+/// that the solids come apart. Elsewhere sheets meet. The faces of a part that has no open edge stay together, so that
+/// a fin which goes on flat from the wall of a box does not open the box; then the flattest pairs go on into each
+/// other: of three plates the straight two.
 pub(super) fn pair_faces(draft: &mut Draft, table: &EdgeTable) -> (Twins, Vec<CutEdge>) {
     let mut twins = table.twins();
     let is_cut = |group: &[(VertexId, HalfedgeId)]| group.len() > 2;
@@ -162,7 +162,8 @@ fn pair_alternating(spokes: &[Spoke]) -> Option<Vec<(HalfedgeId, HalfedgeId)>> {
 /// are equally flat: all the edges along a joint should be paired alike.
 const SAME_ANGLE: f64 = 1e-4;
 
-/// Pairs within closed parts, and within what is open, then others; each in the order of their flatness; of equally flat ones those that agree in direction come first.
+/// Pairs within closed parts, and within what is open, then others; each in the order of their flatness; of equally
+/// flat ones those that agree in direction come first.
 ///
 /// Where as many faces run forward as backward the directions are taken to be right, and every pair agrees: a pair
 /// that did not would turn part of a solid inside out.

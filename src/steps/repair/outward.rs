@@ -2,7 +2,8 @@
 //!
 //! Inside means the whole surface: a component that meets another one anywhere is not inside it, and looks outward.
 //! Nothing in a file tells a cavity from debris within the material, whichever way its faces look: both count as
-//! cavities, so that the inside of the result is well defined, and `keep-components` drops what is too small to be meant.
+//! cavities, so that the inside of the result is well defined, and `keep-components` drops what is too small to be
+//! meant.
 
 use std::cell::OnceCell;
 use std::ops::ControlFlow;

@@ -145,7 +145,8 @@ fn find(parent: &mut IdVec<Vertex, VertexId>, mut v: VertexId) -> VertexId {
     v
 }
 
-/// Clusters up to this size look for the best member in all pairs; larger ones are chains, or a tolerance far too large.
+/// Clusters up to this size look for the best member in all pairs; larger ones are chains, or a tolerance far too
+/// large.
 const LARGEST_EXACT_CLUSTER: usize = 64;
 
 /// Each member with the vertex that it moves onto.

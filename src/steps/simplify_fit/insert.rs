@@ -120,8 +120,8 @@ fn cap_at(bench: &Bench<'_, '_>, v: VertexId) -> Option<(HalfedgeId, f64)> {
     })
 }
 
-/// The part of a curve that a vertex on an edge would make a poor face with, and the foot of the vertex on it: that part
-/// gets the vertex instead. Looked for among the faces that flips would give to the vertex.
+/// The part of a curve that a vertex on an edge would make a poor face with, and the foot of the vertex on it: that
+/// part gets the vertex instead. Looked for among the faces that flips would give to the vertex.
 fn encroached(bench: &Bench<'_, '_>, h: HalfedgeId, share: f64) -> Option<(HalfedgeId, f64)> {
     let mesh = bench.editor.mesh();
     let p = mesh.point(mesh.origin(h)).lerp(mesh.point(mesh.target(h)), share);

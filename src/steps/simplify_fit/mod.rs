@@ -1,4 +1,5 @@
-//! Takes faces away where the surface is flat or a fillet, and keeps new vertices on the fillet's true cylinder or sphere.
+//! Takes faces away where the surface is flat or a fillet, and keeps new vertices on the fillet's true cylinder or
+//! sphere.
 //!
 //! # Algorithm
 //! A queue of faces by their shortest side, which counts as longer where the surface turns (the vertex dispersion). The
@@ -17,8 +18,8 @@
 //! - Topology, marked curves and kept elements stay; no new self-intersection; no face turns over.
 //! - In `distance` mode the surface stays within the tolerance of the reference, both ways, at every moment.
 //! - A vertex with `fit-kind` above 0 lies on its fit, within 1e-9 of the radius. Flat faces stay exactly flat.
-//! - No edit makes a face worse than both `max-aspect` and the worst face that it replaces. Where new vertices in needles
-//!   leave more faces above `max-aspect` than there were, or more faces than without any, none are made.
+//! - No edit makes a face worse than both `max-aspect` and the worst face that it replaces. Where new vertices in
+//!   needles leave more faces above `max-aspect` than there were, or more faces than without any, none are made.
 //!
 //! # Cost
 //! O(F log F).
@@ -111,11 +112,11 @@ pub struct SimplifyFitParams {
     /// How far marked curves may move. Default: `tolerance`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub feature_tolerance: Option<Length>,
-    /// Which mean of the angles at a vertex is its dispersion. Default `"rms"`; `"std"` is the paper's, which is zero on
-    /// straight creases.
+    /// Which mean of the angles at a vertex is its dispersion. Default `"rms"`; `"std"` is the paper's, which is zero
+    /// on straight creases.
     pub dispersion: Dispersion,
-    /// Vertices with a larger dispersion lie on a feature or a fillet. In degrees, default 4: facets of a fillet turn by
-    /// twice as much.
+    /// Vertices with a larger dispersion lie on a feature or a fillet. In degrees, default 4: facets of a fillet turn
+    /// by twice as much.
     pub dispersion_threshold: Angle,
     /// How much longer sides count where the surface turns: `exp(k-m · dispersion)`, dispersion in radians. Default 1,
     /// range 0 to 3; 0 is by length alone.

@@ -53,8 +53,8 @@ const MOST_SWEEPS: usize = 8;
 /// Positions that [`exhaust`] tests in full.
 const ALL_PLACES: usize = 6;
 
-/// Collapses what no test refuses, shortest first, whatever its case and length: for a target that the paper's rounds have
-/// not reached. Returns whether it is.
+/// Collapses what no test refuses, shortest first, whatever its case and length: for a target that the paper's rounds
+/// have not reached. Returns whether it is.
 pub(super) fn exhaust(bench: &mut Bench<'_, '_>, target: usize, watch: &Watch) -> Result<bool, Cancelled> {
     watch.phase("exhaust", None);
     let rules = rules(bench.editor.limits().min_stretch);

@@ -151,8 +151,8 @@ pub struct SimplifyFitStats {
     pub removed: f64,
     /// Operations by case.
     pub operations: Operations,
-    /// Whether needles got no new vertices, since these made more needles, or more faces than there were: everything told
-    /// here is of a second run without them. Absent where false.
+    /// Whether needles got no new vertices, since these made more needles, or more faces than there were: everything
+    /// told here is of a second run without them. Absent where false.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub without_new_vertices: bool,
     /// Trial fits of spheres.

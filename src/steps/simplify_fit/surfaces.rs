@@ -10,8 +10,9 @@ use crate::mesh::{FaceId, Freedom, VertexId};
 use crate::technique::fit::regions::{ENOUGH_POINTS, LEAST_OPENING, MOST_TILT, is_certain};
 use crate::technique::fit::{FitQuality, FitRegion, Quadric, fit_cylinder, fit_sphere};
 
-/// Corners of a region that was there before the first edit lie no further off its fit than this share of the tolerance:
-/// those of a tessellation lie on it but for rounding. With room for noise, a fit would take a part of its neighbour.
+/// Corners of a region that was there before the first edit lie no further off its fit than this share of the
+/// tolerance: those of a tessellation lie on it but for rounding. With room for noise, a fit would take a part of its
+/// neighbour.
 pub(super) const EXACT: f64 = 0.002_5;
 
 /// A merged vertex comes from a fit while it lies no further off than this share of the tolerance.

@@ -1,11 +1,11 @@
 //! Smooth lines: where a flat face of the part runs tangentially into a fillet.
 //!
-//! No dihedral angle finds them: the bend there is half of the one between two facets of the fillet. But a flat face of the
-//! part is much larger than a facet beside it. So coplanar regions are grown, and one that is at least twice as large
-//! as all its smooth neighbours is a flat face, whose smooth edges are curves for the time of the simplification: flat
-//! faces stay exactly flat, and vertices on fillets do not leave them. Strips hardly wider than the tolerance are no flat
-//! faces: between two curves so near nothing could be done but cutting them into ever smaller triangles.
-//! Cost: O(F log F).
+//! No dihedral angle finds them: the bend there is half of the one between two facets of the fillet. But a flat face of
+//! the part is much larger than a facet beside it. So coplanar regions are grown, and one that is at least twice as
+//! large as all its smooth neighbours is a flat face, whose smooth edges are curves for the time of the simplification:
+//! flat faces stay exactly flat, and vertices on fillets do not leave them. Strips hardly wider than the tolerance are
+//! no flat faces: between two curves so near nothing could be done but cutting them into ever smaller triangles. Cost:
+//! O(F log F).
 
 use crate::mesh::geometry::{Aabb, angle, area_vector};
 use crate::mesh::{EdgeKey, EdgeMark, FaceId, Freedom, MarkCause, Surface, edge_key};

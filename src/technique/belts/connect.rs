@@ -1,8 +1,8 @@
 //! Connectors from the outer loop of a belt to the inner one.
 //!
 //! Each begins along the bisector of the angle at its node and walks straight until it comes to the inner loop; the
-//! path laid is the one over edges that hugs the line. It never meets an earlier one: where the walk would cross one, it
-//! leads to that one's end instead, so that the ends keep the order of the beginnings.
+//! path laid is the one over edges that hugs the line. It never meets an earlier one: where the walk would cross one,
+//! it leads to that one's end instead, so that the ends keep the order of the beginnings.
 
 use glam::{DMat3, DVec3};
 use rustc_hash::FxHashSet;
@@ -55,7 +55,8 @@ impl Draft<'_> {
         }
     }
 
-    /// The angle inside a belt at a place of its loop, which has the belt on its left, and the direction that halves it.
+    /// The angle inside a belt at a place of its loop, which has the belt on its left, and the direction that halves
+    /// it.
     fn bisector(&self, belt: u32, rope: &Rope, place: usize) -> (f64, DVec3) {
         let v = rope.vertices[place];
         let normal = self.ground.normal_at(v, |f| self.belts.of[f] == belt);

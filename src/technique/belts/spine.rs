@@ -12,8 +12,8 @@ use crate::technique::layout::Terrain;
 /// A belt without a hole whose nodes all lie within this many intervals of its centre gets one central node.
 const NEAR: f64 = 1.5;
 
-/// A belt winds, as a spiral does, where the way between its ends is so many times as long as that between the points of it
-/// that lie farthest apart.
+/// A belt winds, as a spiral does, where the way between its ends is so many times as long as that between the points
+/// of it that lie farthest apart.
 const WINDING: f64 = 2.0;
 
 impl Draft<'_> {

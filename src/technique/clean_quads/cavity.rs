@@ -1,9 +1,9 @@
 //! Cavities round irregular vertices are filled anew with as few irregular vertices as their rims allow.
 //!
-//! A cavity grows quad by quad from an irregular vertex; whenever its rim turns like a polygon of two to six sides it may
-//! be filled by the patches of [`fill`](crate::technique::fill). So irregular vertices that lie apart, which no edit of a
-//! few quads brings together, cancel each other out. A filling is smoothed, looked at, and taken back unless it is as well
-//! shaped as what was there.
+//! A cavity grows quad by quad from an irregular vertex; whenever its rim turns like a polygon of two to six sides it
+//! may be filled by the patches of [`fill`](crate::technique::fill). So irregular vertices that lie apart, which no
+//! edit of a few quads brings together, cancel each other out. A filling is smoothed, looked at, and taken back unless
+//! it is as well shaped as what was there.
 //!
 //! Based on: G. Bunin. Non-local topological clean-up. 15th International Meshing Roundtable, 2006.
 
@@ -167,8 +167,8 @@ impl Cavity {
         4 * faces >= 3 * now && 2 * faces <= 3 * now + 4
     }
 
-    /// The neighbour that makes the cavity roundest and keeps it a disk: at a vertex that no filling can have on its rim
-    /// first, then the one with most common edges.
+    /// The neighbour that makes the cavity roundest and keeps it a disk: at a vertex that no filling can have on its
+    /// rim first, then the one with most common edges.
     fn next(&self, mesh: &Mixed) -> Option<u32> {
         /// Neighbours tried.
         const CHOICES: usize = 8;

@@ -59,8 +59,8 @@ pub(super) fn lay_flat(mesh: &Mixed, disk: &Disk, rim: &[u32]) -> Flat {
     Flat::new(&points, rim.len(), faces)
 }
 
-/// How badly shaped a filling is likely to be, 0 for squares: the mean and the worst of the squares of what its qualities
-/// lack.
+/// How badly shaped a filling is likely to be, 0 for squares: the mean and the worst of the squares of what its
+/// qualities lack.
 pub(super) fn misshape(mesh: &Mixed, rim: &[u32], pattern: &Pattern) -> f64 {
     let point = |n: usize| if n < rim.len() { mesh.point(rim[n]) } else { pattern.inner[n - rim.len()] };
     let (mut sum, mut worst) = (0.0, 0.0_f64);

@@ -22,8 +22,8 @@
 //!   within a transaction of the caller, who judges them.
 //!
 //! # Cost
-//! O(vertices) a pass; passes stop when nothing gains. A cavity costs O(faces) to grow, times the rows looked for across
-//! it; its size is bounded.
+//! O(vertices) a pass; passes stop when nothing gains. A cavity costs O(faces) to grow, times the rows looked for
+//! across it; its size is bounded.
 
 mod cavity;
 mod edits;
@@ -124,8 +124,8 @@ pub fn clean(
 }
 
 /// Fills cavities round irregular vertices of clean quads anew, in the regions that are `awake`, and cleans again. A
-/// filling within `tolerance` of the surface, or no farther than what was there, is kept, as far as middles of faces and
-/// edges tell. Returns the number of edits.
+/// filling within `tolerance` of the surface, or no farther than what was there, is kept, as far as middles of faces
+/// and edges tell. Returns the number of edits.
 pub fn regularise(
     mesh: &mut Mixed,
     ground: &Ground<'_>,

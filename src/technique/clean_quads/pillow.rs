@@ -1,7 +1,8 @@
 //! Pillowing: a ring of quads between some quads and all others.
 //!
-//! The quads, a disk, shrink, and each edge of their rim gets a quad between where it was and where it is now. That makes
-//! faces smaller at one place and nowhere else, on curves too: one that runs into the disk gets a vertex more for each end.
+//! The quads, a disk, shrink, and each edge of their rim gets a quad between where it was and where it is now. That
+//! makes faces smaller at one place and nowhere else, on curves too: one that runs into the disk gets a vertex more for
+//! each end.
 //!
 //! Based on: S. A. Mitchell, T. J. Tautges. Pillowing doublets: refining a mesh to ensure that faces share at most one
 //! edge. 4th International Meshing Roundtable, 1995.
@@ -67,8 +68,8 @@ fn rim(mesh: &Mixed, faces: &[u32], inside: &FxHashSet<u32>) -> Option<Vec<Shift
 }
 
 impl Cleaner<'_, '_> {
-    /// Pillows some faces within an open transaction and smooths there. Returns the vertices that may have moved; `None`
-    /// where it cannot be done, and the transaction must be rolled back.
+    /// Pillows some faces within an open transaction and smooths there. Returns the vertices that may have moved;
+    /// `None` where it cannot be done, and the transaction must be rolled back.
     pub(super) fn pillow_about(&mut self, faces: &[u32]) -> Option<Vec<u32>> {
         let inside: FxHashSet<u32> = faces.iter().copied().collect();
         let ring = rim(self.mesh, faces, &inside)?;

@@ -41,7 +41,8 @@ pub fn sharpest_sector_of(mesh: &Mixed, f: u32) -> Option<f64> {
     at_nodes.filter_map(|h| sector_of(mesh, h)).map(|(_, angle)| angle).min_by(f64::total_cmp)
 }
 
-/// The sector that the corner at the origin of `h` belongs to, its quads and its angle; `None` at a vertex without curves.
+/// The sector that the corner at the origin of `h` belongs to, its quads and its angle; `None` at a vertex without
+/// curves.
 pub(super) fn sector_of(mesh: &Mixed, h: u32) -> Option<(f64, f64)> {
     let mut found = None;
     walk_sectors(mesh, mesh.origin(h), |corners, angle| {
@@ -52,15 +53,16 @@ pub(super) fn sector_of(mesh: &Mixed, h: u32) -> Option<(f64, f64)> {
     found
 }
 
-/// The sectors between the curves and rims at a vertex, each with its quads and its angle; none where there is no curve.
+/// The sectors between the curves and rims at a vertex, each with its quads and its angle; none where there is no
+/// curve.
 pub(super) fn sectors(mesh: &Mixed, v: u32) -> SmallVec<[(f64, f64); 8]> {
     let mut found = SmallVec::new();
     walk_sectors(mesh, v, |corners, angle| found.push((corners.len() as f64, angle)));
     found
 }
 
-/// Visits each sector at a vertex with its corners, as the sides that leave the vertex, and its angle. Round the end of a
-/// curve that is there alone it is a full turn: two quads, folded upon each other, show less.
+/// Visits each sector at a vertex with its corners, as the sides that leave the vertex, and its angle. Round the end of
+/// a curve that is there alone it is a full turn: two quads, folded upon each other, show less.
 pub(super) fn walk_sectors(mesh: &Mixed, v: u32, mut visit: impl FnMut(&[u32], f64)) {
     let star: SmallVec<[u32; 16]> = mesh.star(v).collect();
     let bound = |h: u32| mesh.arc(h) != NONE || mesh.face(h) == NONE || mesh.face(h ^ 1) == NONE;

@@ -42,16 +42,16 @@ impl Collision {
         self.tree.tidy(mesh);
     }
 
-    /// Whether a new face would meet another new one, or a face that stays, where they share no corner or edge. New ones
-    /// that are known to be one sheet do not meet each other.
+    /// Whether a new face would meet another new one, or a face that stays, where they share no corner or edge. New
+    /// ones that are known to be one sheet do not meet each other.
     pub fn hits(&mut self, mesh: &HalfedgeMesh, old: &[FaceId], new: &[[DVec3; 3]], is_sheet: bool) -> bool {
         let is_sheet = is_sheet || self.star.sees_sheet(new);
         !is_sheet && meet_each_other(new) || self.first_hit(mesh, old, new, |_| false)
     }
 
-    /// As [`Collision::hits`], for new faces that are the old ones cut otherwise: where one of those met another, or a face
-    /// that stays, any of the new ones may meet the same. Even here faces must be tested, since a new corner is rounded off
-    /// the old faces, and the other side of a needle or of a thin sheet is nearer than that.
+    /// As [`Collision::hits`], for new faces that are the old ones cut otherwise: where one of those met another, or a
+    /// face that stays, any of the new ones may meet the same. Even here faces must be tested, since a new corner is
+    /// rounded off the old faces, and the other side of a needle or of a thin sheet is nearer than that.
     pub fn hits_more(
         &mut self,
         mesh: &HalfedgeMesh,
@@ -155,8 +155,8 @@ fn one_sided(a: [DVec3; 3], shared_of_a: u8, b: [DVec3; 3], shared_of_b: u8) -> 
     })
 }
 
-/// 1 where all corners of `a` lie above the plane, -1 where all lie below, by more than rounding; else 0. Corners in the
-/// mask do not count.
+/// 1 where all corners of `a` lie above the plane, -1 where all lie below, by more than rounding; else 0. Corners in
+/// the mask do not count.
 #[inline]
 fn sides(a: [DVec3; 3], mask: u8, foot: DVec3, normal: DVec3) -> i8 {
     let size = 1e-9 * normal.abs().element_sum();

@@ -1,11 +1,10 @@
 //! The side of a reference: which live face covers which piece of it.
 //!
 //! Pieces are parts of the reference's triangles, each within reach of the one face that owns it. An edit must find an
-//! owner for every piece of the faces that it replaces; a piece that no single face covers is cut along the sides of the
-//! face nearest to its middle, so that a face over `k` others leaves about `k` pieces, whatever their size against the
-//! reach. Where all pieces of a triangle of the reference are looked at together, the triangle is cut anew instead of
-//! its pieces, so that pieces do not grow ever smaller.
-//! Cost: a few pieces a face; 88 bytes each.
+//! owner for every piece of the faces that it replaces; a piece that no single face covers is cut along the sides of
+//! the face nearest to its middle, so that a face over `k` others leaves about `k` pieces, whatever their size against
+//! the reach. Where all pieces of a triangle of the reference are looked at together, the triangle is cut anew instead
+//! of its pieces, so that pieces do not grow ever smaller. Cost: a few pieces a face; 88 bytes each.
 
 use glam::DVec3;
 
@@ -336,8 +335,8 @@ fn cut_part(
     divide(part, &check.targets[at as usize], reach, parts)
 }
 
-/// Cuts a part along the sides of the triangle nearest to its middle, or, where it lies beyond a side, across the ends of
-/// that side, or else into halves; `false` where it is too small for that.
+/// Cuts a part along the sides of the triangle nearest to its middle, or, where it lies beyond a side, across the ends
+/// of that side, or else into halves; `false` where it is too small for that.
 fn divide(part: &[DVec3], target: &Target, reach: Reach, parts: &mut Vec<Convex>) -> bool {
     let before = parts.len();
     let over = (target.squared > 0.0)

@@ -1,12 +1,12 @@
 //! How far an edit takes the surface from where it was, without a look at the reference.
 //!
-//! Old and new faces are seen from one side, along their common normal. Where both lie as one sheet over the same polygon,
-//! every point of a new face has an old one straight below or above it, and the gap between the two is linear between
-//! the corners of the overlay: the inner vertices of either and the crossings of their inner edges. So the largest gap
-//! there, plus what the old faces below may be off the reference, bounds what a new face is off. Bounds add up edit by
-//! edit until one exceeds the tolerance; then the face is held against the reference itself, and starts anew.
-//! Only the common edits are seen: a star about one inner vertex, and the flip of an edge.
-//! Cost: a few hundred products an edit; allocates nothing once its lists have grown.
+//! Old and new faces are seen from one side, along their common normal. Where both lie as one sheet over the same
+//! polygon, every point of a new face has an old one straight below or above it, and the gap between the two is linear
+//! between the corners of the overlay: the inner vertices of either and the crossings of their inner edges. So the
+//! largest gap there, plus what the old faces below may be off the reference, bounds what a new face is off. Bounds add
+//! up edit by edit until one exceeds the tolerance; then the face is held against the reference itself, and starts
+//! anew. Only the common edits are seen: a star about one inner vertex, and the flip of an edge. Cost: a few hundred
+//! products an edit; allocates nothing once its lists have grown.
 
 use glam::DVec3;
 

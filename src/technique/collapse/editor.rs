@@ -175,8 +175,8 @@ impl<'a> Editor<'a> {
         }
     }
 
-    /// As [`Editor::certified_distance`], and nearer where the surface began as the reference and every edit told how far
-    /// it moved the surface: 0 where there was none.
+    /// As [`Editor::certified_distance`], and nearer where the surface began as the reference and every edit told how
+    /// far it moved the surface: 0 where there was none.
     pub fn distance_bound(&mut self, tolerance: f64) -> Option<f64> {
         let traced = match &self.keeper {
             Keeper::Distance { envelope, .. } => envelope.traced(&self.mesh),

@@ -6,16 +6,16 @@
 //! - **Reference to surface.** The reference is cut into pieces; each is owned by one live face, in whose offset its
 //!   corners lie. An edit must find an owner among the new faces, or those next to them, for every piece of the faces
 //!   that it replaces (`cover`).
-//! - **Surface to reference.** Each face has a bound of its distance, to which an edit adds how far it moves the surface
-//!   (`drift`): no look at the reference while that is within the tolerance. Else the new face is cut along the sides of
-//!   the triangles of the reference that lie under it, found by their box hierarchy, until every part lies in the offset
-//!   of one of them, or within `ε` by the Lipschitz bound of its middle.
+//! - **Surface to reference.** Each face has a bound of its distance, to which an edit adds how far it moves the
+//!   surface (`drift`): no look at the reference while that is within the tolerance. Else the new face is cut along the
+//!   sides of the triangles of the reference that lie under it, found by their box hierarchy, until every part lies in
+//!   the offset of one of them, or within `ε` by the Lipschitz bound of its middle.
 //!
 //! Both are local and exact up to rounding, for which 2 % of the tolerance are held back; so the surface as a whole
 //! keeps the tolerance at every moment. Where the input broke it at the beginning, no edit makes that worse.
-//! Related: Hu et al., Error-Bounded and Feature Preserving Surface Remeshing with Minimal Angle Improvement, TVCG 2017,
-//! which bounds samples; pieces need no sampling density, and a flat part needs few.
-//! Cost: about as many parts as triangles of one surface lie under a face of the other.
+//! Related: Hu et al., Error-Bounded and Feature Preserving Surface Remeshing with Minimal Angle Improvement, TVCG
+//! 2017, which bounds samples; pieces need no sampling density, and a flat part needs few. Cost: about as many parts as
+//! triangles of one surface lie under a face of the other.
 
 use glam::DVec3;
 
@@ -141,8 +141,8 @@ impl<'a> Envelope<'a> {
         within && self.cover.uncovered == 0
     }
 
-    /// A bound of the two-sided distance from what edits have moved; `None` where some edit was admitted without one, or
-    /// the mesh did not begin as the reference.
+    /// A bound of the two-sided distance from what edits have moved; `None` where some edit was admitted without one,
+    /// or the mesh did not begin as the reference.
     ///
     /// A bound of a new face is that of the old faces below it and the gap between them. The same gap takes whatever
     /// lies on the old faces to the new one, so the bounds of all faces hold for the reference's points as well.
@@ -214,8 +214,8 @@ impl<'a> Envelope<'a> {
             })
     }
 
-    /// Whether the points of a triangle that stray first, the middles of it and of its sides, lie within the tolerance: a
-    /// cheap answer where the full test would bisect for long before it says no.
+    /// Whether the points of a triangle that stray first, the middles of it and of its sides, lie within the tolerance:
+    /// a cheap answer where the full test would bisect for long before it says no.
     fn may_be_within(&self, &[a, b, c]: &Triangle) -> bool {
         let squared = self.reach * self.reach;
         // The side opposite the changed corner is an old one.
@@ -226,8 +226,8 @@ impl<'a> Envelope<'a> {
     /// A bound of the distance of a triangle from the reference where it lies within the tolerance.
     ///
     /// A part that no single triangle covers is cut along the sides of the one nearest to its middle: what lies over
-    /// that one is judged by its corners, the rest goes on. Neighbouring parts mostly lie near the same triangle, so the
-    /// last one found is asked first, and the tree is searched only until something is near enough.
+    /// that one is judged by its corners, the rest goes on. Neighbouring parts mostly lie near the same triangle, so
+    /// the last one found is asked first, and the tree is searched only until something is near enough.
     fn bound(&mut self, face: &Triangle, mut budget: usize) -> Option<f64> {
         let mut parts = std::mem::take(&mut self.parts);
         parts.clear();
@@ -243,8 +243,8 @@ impl<'a> Envelope<'a> {
         bound.map(|squared| squared.sqrt().min(self.reach))
     }
 
-    /// Certifies a part, and says by which squared distance, or replaces it by smaller ones; `None` where it reaches out
-    /// of the zone, or may.
+    /// Certifies a part, and says by which squared distance, or replaces it by smaller ones; `None` where it reaches
+    /// out of the zone, or may.
     fn settle_part(&mut self, part: &Convex, known: &mut Option<Target>, parts: &mut Vec<Convex>) -> Option<f64> {
         let squared = self.reach * self.reach;
         if let Some(furthest) = known.and_then(|known| known.furthest(part, squared)) {

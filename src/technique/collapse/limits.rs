@@ -53,8 +53,8 @@ pub struct Limits {
     pub max_valence: usize,
 }
 
-/// The least stretch of a new face, where the faces that it replaces reach down to `before`: the limit, or what was there
-/// already where that breaks it. Allows for the single precision in which stretch is kept.
+/// The least stretch of a new face, where the faces that it replaces reach down to `before`: the limit, or what was
+/// there already where that breaks it. Allows for the single precision in which stretch is kept.
 pub fn least_stretch(limit: f64, before: f64) -> f64 {
     if before < limit * (1.0 - 1e-6) { before } else { limit }
 }

@@ -126,8 +126,8 @@ impl Editor<'_> {
         (improves && even && !self.folds()).then_some(after)
     }
 
-    /// The point of least squared distance to the planes and lines of all that was merged, nearest to `near`; `None` where
-    /// freedom fixes the place, the planes leave it far away, or it is that point itself.
+    /// The point of least squared distance to the planes and lines of all that was merged, nearest to `near`; `None`
+    /// where freedom fixes the place, the planes leave it far away, or it is that point itself.
     pub fn optimum(&self, merge: &Merge, near: DVec3) -> Option<DVec3> {
         if merge.placement != Placement::Anywhere {
             return None;
@@ -205,8 +205,8 @@ impl Editor<'_> {
         }
     }
 
-    /// Sets the least stretch that edits keep, and gives the one that held: for halvings, which make a face worse before
-    /// the next one makes both better.
+    /// Sets the least stretch that edits keep, and gives the one that held: for halvings, which make a face worse
+    /// before the next one makes both better.
     pub fn set_min_stretch(&mut self, least: f64) -> f64 {
         std::mem::replace(&mut self.limits.min_stretch, least)
     }

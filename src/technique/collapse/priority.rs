@@ -93,8 +93,8 @@ const LEAST_QUALITY: f64 = 1e-9;
 const FAIR_QUALITY: f64 = 0.25;
 
 impl Priority {
-    /// A cheap stand-in for the index of an edge of this length: what it comes to where the star is even and stays fairly
-    /// good; `None` where length says nothing.
+    /// A cheap stand-in for the index of an edge of this length: what it comes to where the star is even and stays
+    /// fairly good; `None` where length says nothing.
     ///
     /// An edge shorter than its star is worth more than its index says, because to collapse it spoils the star least.
     pub fn estimate(self, length: f64) -> Option<f32> {

@@ -1,16 +1,16 @@
 //! The order of collapses: edges by their index, rated only when they are about to be the best.
 //!
-//! A waiting edge holds what its index was, or an estimate from its length. The edge on top is rated: it collapses where
-//! its index is not below what the next one holds, else it goes back with the index. After a collapse the edges of the
-//! merged vertex get new estimates, those further out keep what they have, and refused ones come back at a lower place,
-//! so that a neighbourhood that changes often does not rate them each time. No edge is forgotten: when the queue is
-//! empty, every live edge was refused with its star as it is.
+//! A waiting edge holds what its index was, or an estimate from its length. The edge on top is rated: it collapses
+//! where its index is not below what the next one holds, else it goes back with the index. After a collapse the edges
+//! of the merged vertex get new estimates, those further out keep what they have, and refused ones come back at a lower
+//! place, so that a neighbourhood that changes often does not rate them each time. No edge is forgotten: when the queue
+//! is empty, every live edge was refused with its star as it is.
 //!
 //! While a hierarchy is recorded every edge waits with its index proper instead: estimates let neighbours collapse one
 //! after the other, which is as good for the result, but chains the levels of one place to those of another.
 //!
-//! Estimates are kept to an eighth of an octave. Edges of the same step leave by number, which is by place: one collapse
-//! finds in the cache what the one before it has read.
+//! Estimates are kept to an eighth of an octave. Edges of the same step leave by number, which is by place: one
+//! collapse finds in the cache what the one before it has read.
 
 use super::editor::{Attempt, CollapseRules, Editor};
 use crate::mesh::halfedge::edge_of;

@@ -2,7 +2,8 @@
 //!
 //! The vertices round the edge, their positions, and the faces that survive as pairs of neighbours on that ring. What
 //! does not depend on the candidate (sides on the ring, normals of the faces as they are) is computed once; a
-//! candidate then costs two square roots and one cross product a face. Nothing here allocates once the arrays have grown.
+//! candidate then costs two square roots and one cross product a face. Nothing here allocates once the arrays have
+//! grown.
 
 use glam::DVec3;
 

@@ -159,8 +159,8 @@ impl<'a> Compounds<'a> {
     }
 }
 
-/// The width of the side behind an opening, which a rounding or a chamfer may part from it; the opening's own where there
-/// is no side, or a funnel leads to it.
+/// The width of the side behind an opening, which a rounding or a chamfer may part from it; the opening's own where
+/// there is no side, or a funnel leads to it.
 fn bore(
     surface: &Surface,
     edges: &EdgeTable,

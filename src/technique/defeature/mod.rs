@@ -1,11 +1,11 @@
 //! Removes small round features: through holes, blind holes and bosses below a diameter.
 //!
-//! Marked edges cut the surface into patches. A ring of faces between two circles whose normals are perpendicular to its
-//! axis is the side of a hole, if they point to the axis, or of a boss; see `cavity` for steps, chamfers and floors.
-//! The faces of a feature are taken out, its rims are filled without new vertices by the triangulation of the least bend
-//! ([`triangulate_loop`](super::triangulate_loop)), and the fill is refined and improved while its rim stays as it is. A
-//! feature is left alone if a lock holds any of its vertices or if its fill would meet something. After a round the
-//! marks of vanished rims are gone, so that a boss with a hole is a boss in the next one.
+//! Marked edges cut the surface into patches. A ring of faces between two circles whose normals are perpendicular to
+//! its axis is the side of a hole, if they point to the axis, or of a boss; see `cavity` for steps, chamfers and
+//! floors. The faces of a feature are taken out, its rims are filled without new vertices by the triangulation of the
+//! least bend ([`triangulate_loop`](super::triangulate_loop)), and the fill is refined and improved while its rim stays
+//! as it is. A feature is left alone if a lock holds any of its vertices or if its fill would meet something. After a
+//! round the marks of vanished rims are gone, so that a boss with a hole is a boss in the next one.
 //!
 //! When no ring between marks is left, edges that are sharp without a mark cut as well, because marks leave gaps where
 //! rims nearly touch; then what lies behind the openings of flat faces is looked at as a whole (see `compound`), which
@@ -13,10 +13,10 @@
 //! listed once, by the first search that came upon it; the pieces of bores and bosses that break out at their side come
 //! last (see `open_side`).
 //!
-//! Based on: H. Date, S. Kanai, T. Kishinami, I. Nishigaki, T. Dohi. *High-Quality and Property Controlled Finite Element
-//! Mesh Generation From Triangular Meshes using the Multiresolution Technique*, JCISE 5(4), 2005, section 6.3.2.
-//! Departure: the paper refines a fill to the mean size of the mesh; where the edges of its rim are shorter, we refine to
-//! 1.5 times their mean, because a fan over a fine rim would be all slivers.
+//! Based on: H. Date, S. Kanai, T. Kishinami, I. Nishigaki, T. Dohi. *High-Quality and Property Controlled Finite
+//! Element Mesh Generation From Triangular Meshes using the Multiresolution Technique*, JCISE 5(4), 2005, section
+//! 6.3.2. Departure: the paper refines a fill to the mean size of the mesh; where the edges of its rim are shorter, we
+//! refine to 1.5 times their mean, because a fan over a fine rim would be all slivers.
 //!
 //! # Invariants
 //! Faces that belong to no removed feature, and all vertices of rims, are identical in the result; the surface stays an
@@ -218,8 +218,8 @@ struct Round<'a> {
 }
 
 impl Round<'_> {
-    /// The surface without what was found first: by marks; by sharp edges, where marks have gaps; behind sharp openings;
-    /// behind rounded ones.
+    /// The surface without what was found first: by marks; by sharp edges, where marks have gaps; behind sharp
+    /// openings; behind rounded ones.
     fn run(&mut self, watch: &Watch) -> Result<Option<Surface>, DefeatureError> {
         let Wishes { most, kinds, .. } = self.wishes;
         let edges = EdgeTable::new(self.surface);

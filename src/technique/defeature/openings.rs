@@ -1,7 +1,7 @@
 //! Openings in flat faces: closed rims with a face flat all round them, whatever lies behind.
 //!
-//! The side that a rim of one hole shows need not be a ring: bores that cross, or that overlap, have one side in common.
-//! Seen from the face that they are drilled into, each is a closed rim all the same.
+//! The side that a rim of one hole shows need not be a ring: bores that cross, or that overlap, have one side in
+//! common. Seen from the face that they are drilled into, each is a closed rim all the same.
 
 use glam::DVec3;
 
@@ -11,8 +11,8 @@ use super::round::{circle, unroundness};
 use crate::mesh::id::Face;
 use crate::mesh::{FaceId, IdVec, Surface};
 
-/// Cosine between the rim's plane and the faces round it: at most 37 degrees where the rim is sharp, as on a shaft of 1.7
-/// times the bore; 1 degree else, because the strips of a rounding have smooth rims as well.
+/// Cosine between the rim's plane and the faces round it: at most 37 degrees where the rim is sharp, as on a shaft of
+/// 1.7 times the bore; 1 degree else, because the strips of a rounding have smooth rims as well.
 const FLAT: [f64; 2] = [0.8, 0.99985];
 /// A rim is sharp where the cosine between the faces on both sides is less: 20 degrees.
 const SHARP: f64 = 0.94;

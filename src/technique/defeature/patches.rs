@@ -13,7 +13,8 @@ use crate::mesh::{EdgeId, EdgeKey, FaceId, IdVec, MarkCause, Surface, VertexId};
 
 /// An unmarked edge is sharp from this angle between the normals on, in degrees: what marks are given for by default.
 const SHARP: f64 = 30.0;
-/// Faces that turn by less than this are flat, in degrees: below the first step of a rounding, above rounded coordinates.
+/// Faces that turn by less than this are flat, in degrees: below the first step of a rounding, above rounded
+/// coordinates.
 const BENT: f64 = 1.0;
 
 /// The marked edges.
@@ -21,8 +22,8 @@ pub(super) fn marked(surface: &Surface, edges: &EdgeTable) -> IdVec<Edge, bool> 
     edges.keys().iter().map(|key| surface.carried.marks.contains_key(key)).collect()
 }
 
-/// The edges marked as sharp and all that are so without a mark; `None` on a surface without such marks, which nobody has
-/// searched for them.
+/// The edges marked as sharp and all that are so without a mark; `None` on a surface without such marks, which nobody
+/// has searched for them.
 pub(super) fn sharp(surface: &Surface, edges: &EdgeTable, normals: &IdVec<Face, DVec3>) -> Option<IdVec<Edge, bool>> {
     let marks = &surface.carried.marks;
     let is_marked = |key: &EdgeKey| marks.get(key).is_some_and(|mark| mark.cause == MarkCause::Feature);

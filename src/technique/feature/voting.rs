@@ -14,8 +14,9 @@
 //! normals jump, so the band shrinks to one line of edges, and a crease that fades out just ends. Faces that no front
 //! fits, as on ribs narrower than the radius, keep their own normal.
 //!
-//! A vertex also belongs to the band where votes that are not mirrored say so: mirrored votes agree on a rounded edge as
-//! they do on any cylinder, and scans round all edges. Slivers, whose normals mean nothing, take the mean around them.
+//! A vertex also belongs to the band where votes that are not mirrored say so: mirrored votes agree on a rounded edge
+//! as they do on any cylinder, and scans round all edges. Slivers, whose normals mean nothing, take the mean around
+//! them.
 //!
 //! Geodesic distances are those along edges, and from the nearest corner to a face's centroid.
 //!

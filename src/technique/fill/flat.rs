@@ -1,5 +1,5 @@
-//! Where the nodes of a new pattern should lie on a cavity that is bent: what it holds is laid flat in the unit disk, the
-//! pattern too, and each new node is found among the old faces and taken back with them.
+//! Where the nodes of a new pattern should lie on a cavity that is bent: what it holds is laid flat in the unit disk,
+//! the pattern too, and each new node is found among the old faces and taken back with them.
 
 use glam::{DVec2, DVec3};
 

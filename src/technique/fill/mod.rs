@@ -1,7 +1,7 @@
 //! What a cavity in a mesh of quads can be filled with, and where the new nodes lie.
 //!
-//! [`Outline`] finds quads over a loop of nodes with as few irregular nodes as its corners allow; [`Flat`] lays what the
-//! cavity holds flat, so that nodes of the new [`Pattern`] are found on it.
+//! [`Outline`] finds quads over a loop of nodes with as few irregular nodes as its corners allow; [`Flat`] lays what
+//! the cavity holds flat, so that nodes of the new [`Pattern`] are found on it.
 //!
 //! Based on: G. Bunin. Non-local topological clean-up. 15th International Meshing Roundtable, 2006.
 

@@ -2,8 +2,8 @@
 //!
 //! A loop of four sides takes a grid, one of three or five sides a grid at each corner, all round one node. Where the
 //! lengths of the sides forbid that, or where there are two or six corners, a straight row cuts the loop in two that
-//! each take such a patch: a node of three and one of five quads make up for sides that differ. Where a loop turns back,
-//! as round the corner of a hole, the row begins there.
+//! each take such a patch: a node of three and one of five quads make up for sides that differ. Where a loop turns
+//! back, as round the corner of a hole, the row begins there.
 
 use super::new_node;
 use smallvec::SmallVec;

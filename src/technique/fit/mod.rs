@@ -1,12 +1,14 @@
-//! Fits of spheres and cylinders to the vertices of a patch: an algebraic start, then Gauss-Newton on the true distance.
+//! Fits of spheres and cylinders to the vertices of a patch: an algebraic start, then Gauss-Newton on the true
+//! distance.
 //!
 //! Every fit reports how far to trust it: residual, extent of the patch, how much of the surface it sees, conditioning,
 //! and from these the uncertainty of the radius. A fit that its points do not determine is refused with the reason.
 //!
 //! Based on: M. Zhang et al.'s trial fits (2009, section 3.4), with the corrections that its equations need: its
-//! algebraic distance is about `2R` times the true one and draws small arcs to small radii, and its nine coefficients of a
-//! quadric are no cylinder, which has five. The true distances and their derivatives are those of G. Lukács, R. Martin,
-//! D. Marshall, Faithful least-squares fitting of spheres, cylinders, cones and tori for reliable segmentation, 1998.
+//! algebraic distance is about `2R` times the true one and draws small arcs to small radii, and its nine coefficients
+//! of a quadric are no cylinder, which has five. The true distances and their derivatives are those of G. Lukács, R.
+//! Martin, D. Marshall, Faithful least-squares fitting of spheres, cylinders, cones and tori for reliable segmentation,
+//! 1998.
 //!
 //! Invariants: place and scale of the points change nothing but place and scale of the fit (up to rounding); points on
 //! an exact sphere or cylinder give that one within 1e-9 of its radius. Cost: linear in the points, ten rounds at most.
@@ -165,7 +167,8 @@ fn quality(points: &[DVec3], quadric: &Quadric, reach: f64, solved: Solved) -> F
 struct Solved {
     unknowns: usize,
     condition: f64,
-    /// The entry of the inverse of JᵀJ that belongs to the radius; without a unit, as radius and distances share theirs.
+    /// The entry of the inverse of JᵀJ that belongs to the radius; without a unit, as radius and distances share
+    /// theirs.
     radius_variance: f64,
     rounds: usize,
 }

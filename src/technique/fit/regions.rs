@@ -45,8 +45,8 @@ const LEAST_BEND: f64 = 0.009;
 /// A neighbourhood is widened until normals turn by this angle in radians, 15 degrees, or until it has so many faces.
 const SPREAD: f64 = 0.262;
 
-/// A face that so many refused candidates took in is no seed: else a large area that is nearly a fit would be grown over
-/// again from each of its faces.
+/// A face that so many refused candidates took in is no seed: else a large area that is nearly a fit would be grown
+/// over again from each of its faces.
 const MOST_VAIN: u8 = 8;
 
 /// A neighbourhood has no more faces than these, and so many round a seed in vain are no seeds.

@@ -144,8 +144,8 @@ impl Front<'_, '_> {
         self.flip(edge).then_some(far)
     }
 
-    /// The edge opposite to the node that the wanted direction crosses, directed as in the fan's triangle, and where its
-    /// ends lie when the fan is laid flat.
+    /// The edge opposite to the node that the wanted direction crosses, directed as in the fan's triangle, and where
+    /// its ends lie when the fan is laid flat.
     fn across(&self, fan: &Fan, wanted: f64) -> Option<(u32, DVec2, DVec2)> {
         let i = (1..fan.spokes.len()).find(|&i| fan.spokes[i].1 > wanted)?;
         let [(v, from), (w, to)] = [fan.spokes[i - 1], fan.spokes[i]];

@@ -48,7 +48,8 @@ impl Front<'_, '_> {
             count += 1.0;
         }
         match (count > 0.0, mixed) {
-            // A finished vertex: the middle of its neighbours; one at the front: half way to the parallelograms' corner.
+            // A finished vertex: the middle of its neighbours; one at the front: half way to the parallelograms'
+            // corner.
             (true, false) | (false, _) => ring / spokes,
             (true, true) => now.lerp(sum / count, 0.5),
         }

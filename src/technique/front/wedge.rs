@@ -1,7 +1,7 @@
 //! The sharp corners of regions: each gets its quad before anything else.
 //!
-//! Between two curves that meet in a sharp angle a row of quads can only end in a triangle. Two rows can start there, from
-//! a kite with a corner of its own ahead of the chord; so sharp corners are given their kites first.
+//! Between two curves that meet in a sharp angle a row of quads can only end in a triangle. Two rows can start there,
+//! from a kite with a corner of its own ahead of the chord; so sharp corners are given their kites first.
 
 use smallvec::smallvec;
 

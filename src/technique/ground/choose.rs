@@ -1,7 +1,7 @@
 //! Which borders of regions are worth following: those that force bad faces are left out of the network.
 //!
-//! A border that meets another curve in a narrow wedge, or ends so near to another node that nothing fits between, would
-//! cost more in shapes than it gives in order. Marked edges and borders of face groups are always followed.
+//! A border that meets another curve in a narrow wedge, or ends so near to another node that nothing fits between,
+//! would cost more in shapes than it gives in order. Marked edges and borders of face groups are always followed.
 
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -69,11 +69,11 @@ impl Front<'_> {
 }
 
 impl Front<'_> {
-    /// As [`Front::refine_to`], and on until no face has a side longer than the threshold of any of its corners, but for
-    /// sides of the finest mesh.
+    /// As [`Front::refine_to`], and on until no face has a side longer than the threshold of any of its corners, but
+    /// for sides of the finest mesh.
     ///
-    /// A node's recorded size is the mean over its star when it was made; its faces grow when neighbours merge later, and
-    /// the longest one counts here. O(finest faces) a round; few rounds.
+    /// A node's recorded size is the mean over its star when it was made; its faces grow when neighbours merge later,
+    /// and the longest one counts here. O(finest faces) a round; few rounds.
     pub fn refine_faces_to(&mut self, thresholds: &Thresholds, watch: &Watch) -> Result<(), Cancelled> {
         self.refine_to(thresholds, watch)?;
         loop {
@@ -107,8 +107,8 @@ impl Front<'_> {
         (count, worst)
     }
 
-    /// The end of a face's longest side that was merged last, where the side is too long for a corner; `None` where it is
-    /// not, or neither end can be split.
+    /// The end of a face's longest side that was merged last, where the side is too long for a corner; `None` where it
+    /// is not, or neither end can be split.
     fn coarse_end(&self, corners: [NodeId; 3], thresholds: &Thresholds) -> Option<NodeId> {
         let points = corners.map(|node| self.hierarchy().point(node));
         let sides = [(0, 1), (1, 2), (2, 0)].map(|(i, j)| (points[i].distance(points[j]), corners[i].max(corners[j])));

@@ -40,7 +40,8 @@ pub fn extract(front: &Front<'_>) -> Surface {
     Surface { points, faces, carried: carry(&finest.carried, &moved, &heirs, &kept) }
 }
 
-/// The leaf whose own properties each vertex carries on: the kept end of each merge. `None` for leaves that lost theirs.
+/// The leaf whose own properties each vertex carries on: the kept end of each merge. `None` for leaves that lost
+/// theirs.
 fn heirs(front: &Front<'_>, nodes: &[NodeId]) -> Renumber<Vertex> {
     let hierarchy = front.hierarchy();
     let mut heirs: Renumber<Vertex> = IdVec::filled(None, hierarchy.leaf_count());

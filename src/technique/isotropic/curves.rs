@@ -41,8 +41,8 @@ pub fn curve_distance(mesh: &Mixed, ground: &Ground<'_>) -> f64 {
     chains(mesh, ground).into_iter().enumerate().map(sag).fold(0.0, f64::max)
 }
 
-/// Cuts an edge on a curve, which covers it between these lengths from its start, into three, so that the regions beside
-/// it keep an even number of edges. Whether it could.
+/// Cuts an edge on a curve, which covers it between these lengths from its start, into three, so that the regions
+/// beside it keep an even number of edges. Whether it could.
 pub fn cut_in_three(mesh: &mut Mixed, ground: &Ground<'_>, rules: Rules, h: u32, [from, to]: [f64; 2]) -> bool {
     let (arc, last) = (mesh.arc(h), mesh.target(h));
     let size = mesh.length(h) / 3.0;
@@ -98,8 +98,8 @@ impl Remesher<'_, '_> {
         touched
     }
 
-    /// Where the vertices of a curve should be. Where sizes are lowered, an even number of pieces more, so that no region
-    /// far away has to change for it.
+    /// Where the vertices of a curve should be. Where sizes are lowered, an even number of pieces more, so that no
+    /// region far away has to change for it.
     fn samples_alike(&self, arc: usize, chain: &[(f64, u32)], before: &[f64]) -> Vec<f64> {
         let mut places = self.samples(arc, chain, 1);
         if !before.is_empty() && places.len() % 2 != chain.len() % 2 {
@@ -200,7 +200,8 @@ impl Remesher<'_, '_> {
         for (arc, chain) in chains(self.mesh, self.ground).into_iter().enumerate() {
             let sleeps = |&region: &u32| region != NONE && !awake[region as usize];
             let curve = &self.ground.curves[arc];
-            // In a piece of a mesh there may be a piece of the curve only, or vertices of its rim that lie on the curve.
+            // In a piece of a mesh there may be a piece of the curve only, or vertices of its rim that lie on the
+            // curve.
             let is_whole = |chain: &[(f64, u32)]| {
                 let ends = [chain[0].1, chain[chain.len() - 1].1].map(|v| self.mesh.point(v));
                 ends == [curve.points[0], curve.points[curve.points.len() - 1]]

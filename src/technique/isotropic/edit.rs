@@ -120,8 +120,8 @@ impl Remesher<'_, '_> {
         }
     }
 
-    /// Whether the corners opposite to an edge allow its collapse: as the only neighbours of both ends, with enough faces
-    /// left.
+    /// Whether the corners opposite to an edge allow its collapse: as the only neighbours of both ends, with enough
+    /// faces left.
     fn keeps_apexes(&self, h: u32, apexes: &[u32]) -> bool {
         let (kept, gone) = (self.mesh.origin(h), self.mesh.target(h));
         let ring: SmallVec<[u32; 16]> = self.mesh.neighbours(kept).collect();
@@ -207,9 +207,9 @@ impl Remesher<'_, '_> {
         }
     }
 
-    /// Whether a flip takes the middle of its edge away from the surface, by more than chords may be off. Needles from rim to
-    /// rim of a bore have no vertex inside that knows where the surface looks: flip by flip, each a small turn, they would
-    /// come to span the bore.
+    /// Whether a flip takes the middle of its edge away from the surface, by more than chords may be off. Needles from
+    /// rim to rim of a bore have no vertex inside that knows where the surface looks: flip by flip, each a small turn,
+    /// they would come to span the bore.
     fn leaves_surface(&self, h: u32, before: [DVec3; 2], after: [DVec3; 2]) -> bool {
         let region = self.mesh.region(self.mesh.face(h));
         let off = |[p, q]: [DVec3; 2]| self.ground.project_from(region, 0.5 * (p + q), p).distance_squared;

@@ -151,8 +151,8 @@ pub fn polish(mesh: &mut Mixed, ground: &Ground<'_>, rules: Rules, rounds: usize
 }
 
 impl Remesher<'_, '_> {
-    /// Rounds of edits, and so many times lower sizes where they prove too large. Where the sizes `before` are given, only
-    /// near those that are others now.
+    /// Rounds of edits, and so many times lower sizes where they prove too large. Where the sizes `before` are given,
+    /// only near those that are others now.
     fn adapt(&mut self, times: usize, before: &[f64], watch: &Watch) -> Result<(), Cancelled> {
         self.grade();
         let touched = self.resample_curves(before);
@@ -303,8 +303,8 @@ impl Remesher<'_, '_> {
             self.split(h, middle, normal, Place::Region(region), size);
             return;
         }
-        // On coarse facets the foot may leave the faces beside the edge, and beside a curve it may land on that: then the
-        // middle of the edge itself serves.
+        // On coarse facets the foot may leave the faces beside the edge, and beside a curve it may land on that: then
+        // the middle of the edge itself serves.
         let spoils = self.poorest_half(h, foot.point) < SPOILT * self.poorest_half(h, middle);
         let points = if spoils { [middle, foot.point] } else { [foot.point, middle] };
         for point in points {

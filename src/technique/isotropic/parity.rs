@@ -1,8 +1,8 @@
 //! Makes the number of border edges of each region even, so that it can be filled with quads alone.
 //!
 //! A curve between two regions counts once on each side; splitting one of its edges turns the parity of both. The odd
-//! regions are paired by a T-join in a breadth-first tree over the regions, whose root is the open border where there is
-//! one: from the leaves up, an odd region splits the longest edge of the curve towards its parent. Linear time.
+//! regions are paired by a T-join in a breadth-first tree over the regions, whose root is the open border where there
+//! is one: from the leaves up, an odd region splits the longest edge of the curve towards its parent. Linear time.
 
 use std::collections::VecDeque;
 

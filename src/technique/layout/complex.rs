@@ -38,8 +38,8 @@ impl Layout<'_> {
         Complex { cell: self.cell, count: self.faces.len(), node: self.node, fixed: self.fixed }
     }
 
-    /// The faces to cut so that paths run from every corner of these cells: all but those that fill a corner alone. Such
-    /// a face is then halved from its corner, while cutting it in four would leave it with no edge inside again.
+    /// The faces to cut so that paths run from every corner of these cells: all but those that fill a corner alone.
+    /// Such a face is then halved from its corner, while cutting it in four would leave it with no edge inside again.
     pub fn tight(&self, cells: &[u32]) -> Vec<FaceId> {
         let mut chosen: Vec<FaceId> = Vec::new();
         for &cell in cells {

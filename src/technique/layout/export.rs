@@ -7,8 +7,8 @@ use crate::mesh::{Carried, Cover, EdgeMark, FaceId, Facet, Freedom, IdVec, MarkC
 
 /// The complex as a mesh: nodes in the order of their vertices, elements in that of their lowest faces.
 ///
-/// Corners and junctions are pinned, rims and borders of domains are marked; regions and those face groups that hold all
-/// faces of an element are kept. Cells that are neither triangles nor quads are left out.
+/// Corners and junctions are pinned, rims and borders of domains are marked; regions and those face groups that hold
+/// all faces of an element are kept. Cells that are neither triangles nor quads are left out.
 pub fn to_quads(layout: &Layout<'_>) -> Quads {
     let ground = layout.ground;
     let mut elements: Vec<(FaceId, u32)> = layout

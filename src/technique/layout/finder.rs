@@ -9,7 +9,8 @@ use super::ground::Ground;
 use crate::mesh::id::Vertex;
 use crate::mesh::{FaceId, IdVec, VertexId};
 
-/// Dijkstra's algorithm, towards a goal where one is given (A*). Of equally long paths the one over the lowest vertices is found.
+/// Dijkstra's algorithm, towards a goal where one is given (A*). Of equally long paths the one over the lowest vertices
+/// is found.
 #[derive(Clone, Debug, Default)]
 pub struct Finder {
     length: IdVec<Vertex, f64>,

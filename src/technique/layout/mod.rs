@@ -1,8 +1,8 @@
 //! A coarse complex of polygons embedded in a triangle mesh.
 //!
-//! Nodes are vertices of the mesh, edges are paths over its edges, and cells are sets of its faces, each a disk that the
-//! nodes on its border make a polygon. Nothing else is stored: borders, neighbours and paths follow from the cell of
-//! each face and from which vertices are nodes. So the complex is conforming by construction, its cells cover every
+//! Nodes are vertices of the mesh, edges are paths over its edges, and cells are sets of its faces, each a disk that
+//! the nodes on its border make a polygon. Nothing else is stored: borders, neighbours and paths follow from the cell
+//! of each face and from which vertices are nodes. So the complex is conforming by construction, its cells cover every
 //! face once, and paths cannot cross.
 //!
 //! The one change is [`Layout::replace`]: some cells that form a disk get another pattern. It either embeds the whole
@@ -199,7 +199,8 @@ impl<'g> Layout<'g> {
     }
 
     /// The least sine-like quality of the corners that these nodes make on a patch of this normal: 1 for a rectangle
-    /// and for the equilateral triangle, less where it is slender, 0 where a corner is straight, negative where it is reflex.
+    /// and for the equilateral triangle, less where it is slender, 0 where a corner is straight, negative where it is
+    /// reflex.
     pub fn quality(&self, nodes: &[VertexId], normal: DVec3) -> f64 {
         let corners: Vec<DVec3> = nodes.iter().map(|&v| self.ground.point(v)).collect();
         quality(&corners, normal)
@@ -296,8 +297,8 @@ impl<'g> Layout<'g> {
     }
 }
 
-/// Patches longer than so many times their shortest side count less, by the cube of what they exceed it: a row of slender
-/// ones has few irregular nodes, and no use.
+/// Patches longer than so many times their shortest side count less, by the cube of what they exceed it: a row of
+/// slender ones has few irregular nodes, and no use.
 const LONG: f64 = 5.0;
 
 /// See [`Layout::quality`].

@@ -187,8 +187,8 @@ impl Layout<'_> {
         change
     }
 
-    /// Carries a proposal out; `None`, and nothing changed, where it is no disk or there is no room, or where a new cell
-    /// would be worse than `least` and worse than the old ones.
+    /// Carries a proposal out; `None`, and nothing changed, where it is no disk or there is no room, or where a new
+    /// cell would be worse than `least` and worse than the old ones.
     pub fn carry_out(&mut self, proposal: &Proposal, least: f64) -> Option<Undo> {
         /// Fewer cells are nearly flat; what is relaxed keeps its connectivity and must not stay where it is.
         const BENT: usize = 8;

@@ -1,8 +1,8 @@
 //! Fills a cavity of a layout with another pattern.
 //!
 //! A chord of the pattern that runs through as few nodes as possible is laid as a path over the cavity's free vertices,
-//! its inner nodes on the vertices nearest to where they should lie; it cuts cavity and pattern in two, and each half is
-//! treated alike. In a disk any two points of the rim can be joined, so the only failure is a mesh too coarse.
+//! its inner nodes on the vertices nearest to where they should lie; it cuts cavity and pattern in two, and each half
+//! is treated alike. In a disk any two points of the rim can be joined, so the only failure is a mesh too coarse.
 
 use rustc_hash::FxHashSet;
 
@@ -29,9 +29,9 @@ pub struct Undo {
 }
 
 impl Layout<'_> {
-    /// Fills the disk of `cells` with a pattern whose rim lies at `rim`, counter-clockwise; all other nodes of the cells
-    /// vanish. Nodes of the rim that are new must lie on the rim of the surface. `None`, and nothing changed, when the
-    /// mesh has no room for it.
+    /// Fills the disk of `cells` with a pattern whose rim lies at `rim`, counter-clockwise; all other nodes of the
+    /// cells vanish. Nodes of the rim that are new must lie on the rim of the surface. `None`, and nothing changed,
+    /// when the mesh has no room for it.
     pub fn replace(&mut self, cells: &[u32], rim: &[VertexId], pattern: &Pattern) -> Option<Undo> {
         debug_assert_eq!(rim.len(), pattern.rim);
         let mut undo = self.clear(cells, rim);
@@ -79,7 +79,8 @@ impl Layout<'_> {
         }
     }
 
-    /// Moves faces back to where they came from, last first; the cells older than `first` that this changed, in rising order.
+    /// Moves faces back to where they came from, last first; the cells older than `first` that this changed, in rising
+    /// order.
     fn move_back(&mut self, moved: &[(FaceId, u32)], first: u32) -> Vec<u32> {
         let mut touched = Vec::new();
         for &(face, home) in moved.iter().rev() {
@@ -142,8 +143,8 @@ impl Layout<'_> {
         !self.node[v] && !self.ground.on_rim[v] && self.ground.faces_at.of(v).iter().all(|&f| self.cell[f] == cell)
     }
 
-    /// Cuts a cell along a path from rim to rim; the cells on its left and right. `None` where the path has left the cell:
-    /// room made for its last leg may have taken faces beside its first.
+    /// Cuts a cell along a path from rim to rim; the cells on its left and right. `None` where the path has left the
+    /// cell: room made for its last leg may have taken faces beside its first.
     fn split(&mut self, cell: u32, path: &[VertexId]) -> Option<(u32, u32)> {
         let is_inner = |w: &[VertexId]| {
             let sides = [self.ground.side_between(w[0], w[1]), self.ground.side_between(w[1], w[0])];
@@ -174,8 +175,8 @@ impl Layout<'_> {
         is_cut.then_some((left, right))
     }
 
-    /// The vertex inside a cell, away from `taken`, that walking from the end of `taken` downhill leads to; `None` where
-    /// the rim of the cell stands in the way.
+    /// The vertex inside a cell, away from `taken`, that walking from the end of `taken` downhill leads to; `None`
+    /// where the rim of the cell stands in the way.
     fn descend(&self, cell: u32, target: DVec3, taken: &[VertexId]) -> Option<VertexId> {
         let distance = |v: VertexId| self.ground.point(v).distance_squared(target);
         let mut at = *taken.last()?;

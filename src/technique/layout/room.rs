@@ -89,8 +89,8 @@ impl Layout<'_> {
         moves.sizes.entry(cell).or_insert_with(|| self.faces[cell as usize].len())
     }
 
-    /// Labels the faces of one cell round `x` as the other's. Both are disks, and what lies between the ends of the fan lies
-    /// inside the first, so both stay disks, with their corners; the paths at the ends begin at other faces.
+    /// Labels the faces of one cell round `x` as the other's. Both are disks, and what lies between the ends of the fan
+    /// lies inside the first, so both stay disks, with their corners; the paths at the ends begin at other faces.
     fn hand_over(&mut self, fan: &[FaceId], [from, to]: [u32; 2], x: VertexId) {
         for side in fan.iter().flat_map(|&face| (0..3).map(move |corner| Side { face, corner })) {
             let Some(beyond) = self.ground.twin(side).filter(|twin| self.cell[twin.face] == to) else { continue };
@@ -114,7 +114,8 @@ impl Layout<'_> {
         }
     }
 
-    /// Carries moves out on the lists of faces, and turns the rings to where they begin; the faces with their old cells.
+    /// Carries moves out on the lists of faces, and turns the rings to where they begin; the faces with their old
+    /// cells.
     fn settle(&mut self, moves: Moves) -> Vec<(FaceId, u32)> {
         let mut met = FxHashSet::default();
         let mut cells: Vec<u32> = moves.cells.iter().rev().copied().filter(|&c| met.insert(c)).collect();
@@ -155,8 +156,8 @@ impl Layout<'_> {
         }
     }
 
-    /// What [`Layout::trace`] finds, in time that grows with the border: for a cell that was a disk and whose border moved
-    /// past some vertices, which leaves it one. `None` where no path begins where it did.
+    /// What [`Layout::trace`] finds, in time that grows with the border: for a cell that was a disk and whose border
+    /// moved past some vertices, which leaves it one. `None` where no path begins where it did.
     fn follow(&self, cell: u32) -> Option<Vec<Corner>> {
         let inside = |f: FaceId| self.cell[f] == cell;
         let is_border = |side: Side| inside(side.face) && !self.ground.beyond(side).is_some_and(inside);

@@ -2,8 +2,8 @@
 //!
 //! [`build`] mends, optimises and records; [`extract_measured`] cuts a mesh and says what it is worth.
 //!
-//! Based on: H. Date, S. Kanai, T. Kishinami, I. Nishigaki. Mesh Simplification and Adaptive LOD for Finite Element Mesh
-//! Generation, 2005, section 5. The forest itself and its fronts are in [`crate::technique::hierarchy`].
+//! Based on: H. Date, S. Kanai, T. Kishinami, I. Nishigaki. Mesh Simplification and Adaptive LOD for Finite Element
+//! Mesh Generation, 2005, section 5. The forest itself and its fronts are in [`crate::technique::hierarchy`].
 
 mod build;
 mod polish;

@@ -5,8 +5,8 @@
 //! by [`Mixed::rollback`], so that an edit can be done first and judged afterwards.
 //!
 //! # Invariants
-//! - Outside an open transaction every face is a triangle or a quad with distinct corners, every edge joins two distinct
-//!   vertices and has one or two faces, and no two edges have the same ends within one star.
+//! - Outside an open transaction every face is a triangle or a quad with distinct corners, every edge joins two
+//!   distinct vertices and has one or two faces, and no two edges have the same ends within one star.
 //! - Slots are never used twice between [`Mixed::compact`]s, so that an id that died stays dead.
 //!
 //! # Cost

@@ -30,8 +30,8 @@ impl Mixed {
     /// Puts the faces `new` in the place of `old`; they get the region of the first old face.
     ///
     /// `moved` says that a vertex was replaced by another one, so that curves through it stay curves. Returns the new
-    /// faces, or `None` where the new ones do not fit into the gap; then the mesh is left torn, and the transaction must
-    /// be rolled back. Vertices that lose all faces die.
+    /// faces, or `None` where the new ones do not fit into the gap; then the mesh is left torn, and the transaction
+    /// must be rolled back. Vertices that lose all faces die.
     pub fn replace(&mut self, old: &[u32], new: &[Corners], moved: Option<(u32, u32)>) -> Option<SmallVec<[u32; 8]>> {
         let region = self.region(*old.first()?);
         let mut patch = self.patch(old);

@@ -15,8 +15,8 @@ pub(super) struct Fit {
     pub(super) spans: usize,
     pub(super) samples: Samples,
     pub(super) patch: Patch,
-    /// The parameters of the samples as they were flattened. Every fit starts from them: corrected ones of a fit that was
-    /// refined since crowd where that one swung, and lead the next one there.
+    /// The parameters of the samples as they were flattened. Every fit starts from them: corrected ones of a fit that
+    /// was refined since crowd where that one swung, and lead the next one there.
     flat: Vec<[f64; 2]>,
     /// What the stages began with last time, and what they came to.
     last: [Option<(Start, State)>; 3],
@@ -74,8 +74,9 @@ impl Fit {
         (self.patch, self.samples.places) = state;
     }
 
-    /// Fits the inside. Where vertices crowd in a part of a winding element, they say little of the rest, and the fit may
-    /// swing out into space: then evenness counts more, and at last the inside stays as it was, at first a Coons patch.
+    /// Fits the inside. Where vertices crowd in a part of a winding element, they say little of the rest, and the fit
+    /// may swing out into space: then evenness counts more, and at last the inside stays as it was, at first a Coons
+    /// patch.
     pub(super) fn fill(&mut self, fairness: f64) {
         const EVENER: [f64; 4] = [1.0, 30.0, 1e3, 1e6];
         let before = self.patch.controls.clone();

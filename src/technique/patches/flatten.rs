@@ -49,8 +49,8 @@ pub(super) fn flatten(frame: &Frame<'_>, element: usize) -> Samples {
     samples
 }
 
-/// Where a square of a grid holds no vertex, the point of the mesh in its middle is a sample: a slender element may have
-/// hardly a vertex inside, and its faces still tell where its patch must lie.
+/// Where a square of a grid holds no vertex, the point of the mesh in its middle is a sample: a slender element may
+/// have hardly a vertex inside, and its faces still tell where its patch must lie.
 fn fill_gaps(ground: &Ground<'_>, faces: &[(FaceId, [[f64; 2]; 3])], samples: &mut Samples) {
     /// Squares along each side.
     const SQUARES: usize = 8;
@@ -137,8 +137,8 @@ fn relax(rows: &[Vec<(usize, f64)>], at: &mut [[f64; 2]], first: usize) {
     }
 }
 
-/// Spreads places that crowd: a bump or the tip of a horn shrinks to a spot in the barycentric map. Neighbours count the
-/// less the more the faces around them are stretched, as long as that lowers the stretch of all.
+/// Spreads places that crowd: a bump or the tip of a horn shrinks to a spot in the barycentric map. Neighbours count
+/// the less the more the faces around them are stretched, as long as that lowers the stretch of all.
 fn spread(mut rows: Vec<Vec<(usize, f64)>>, at: &mut Vec<[f64; 2]>, first: usize, faces: &[([usize; 3], [DVec3; 3])]) {
     /// Below so many times the stretch of a map that keeps lengths the samples are dense enough everywhere.
     const EVEN: f64 = 1.5;

@@ -1,15 +1,14 @@
 //! Fits bicubic B-spline patches to the faces that the elements of a quad mesh cover.
 //!
 //! The common curves come first, least squares over the path with both ends fixed, so that neighbours share them; then
-//! the control points inside, least squares over the covered vertices, and over places between them where there are none,
-//! with a thin-plate term; the parameters are then corrected to the feet of these samples and the fit repeated. A patch
-//! farther from the mesh than the tolerance, or the mesh from it, gets more spans, where that helps.
-//! Patches meet in common curves, which follow the paths without their zigzag; the angle between their tangent planes is
-//! measured. On demand smooth seams get a common plane at each of their points:
-//! curves leave their nodes in one plane, and the control points next to a seam are drawn into the mean of the planes of
-//! both patches, by the same least squares, as far as the tolerance allows and no patch folds. Patches whose smooth seams
-//! still bend too much get more spans. That is tangent continuity within a tolerance, not to the last digit, which bicubic
-//! patches round any node cannot have.
+//! the control points inside, least squares over the covered vertices, and over places between them where there are
+//! none, with a thin-plate term; the parameters are then corrected to the feet of these samples and the fit repeated. A
+//! patch farther from the mesh than the tolerance, or the mesh from it, gets more spans, where that helps. Patches meet
+//! in common curves, which follow the paths without their zigzag; the angle between their tangent planes is measured.
+//! On demand smooth seams get a common plane at each of their points: curves leave their nodes in one plane, and the
+//! control points next to a seam are drawn into the mean of the planes of both patches, by the same least squares, as
+//! far as the tolerance allows and no patch folds. Patches whose smooth seams still bend too much get more spans. That
+//! is tangent continuity within a tolerance, not to the last digit, which bicubic patches round any node cannot have.
 //!
 //! Based on: M. Eck, H. Hoppe. Automatic Reconstruction of B-Spline Surfaces of Arbitrary Topological Type. SIGGRAPH,
 //! 1996; J. Hoschek. Intrinsic Parametrization for Approximation. CAGD 5, 1988.
@@ -180,8 +179,8 @@ fn seam_normals(
     smoothed(&raw, planes).into_iter().filter_map(|(t, normal)| Some((t, across(t, normal)?))).collect()
 }
 
-/// Normals along a seam without what is finer than a parabola, such as the facets of a coarse mesh, and as the planes at
-/// its ends have them there: the curves that meet in a node fix the planes of the patches.
+/// Normals along a seam without what is finer than a parabola, such as the facets of a coarse mesh, and as the planes
+/// at its ends have them there: the curves that meet in a node fix the planes of the patches.
 fn smoothed(normals: &[(f64, DVec3)], ends: EndPlanes) -> Vec<(f64, DVec3)> {
     let row = |t: f64| nalgebra::Vector3::new(1.0, t, t * t);
     let (mut matrix, mut right) = (nalgebra::Matrix3::zeros(), nalgebra::Matrix3::zeros());

@@ -30,9 +30,9 @@ impl Spans {
 
     /// Doubles the spans of what is not good enough, and takes back what did not help; whether anything changed.
     ///
-    /// A bend or a ripple needs several times the spans before they help at all, so doublings go on while there is room.
-    /// What was taken back is not tried again, so that this ends: vertices of a coarse mesh have folds between them that a
-    /// patch of more spans follows, and curves that its neighbours must follow then.
+    /// A bend or a ripple needs several times the spans before they help at all, so doublings go on while there is
+    /// room. What was taken back is not tried again, so that this ends: vertices of a coarse mesh have folds between
+    /// them that a patch of more spans follows, and curves that its neighbours must follow then.
     pub(super) fn refine(&mut self, errors: &[f64], samples: &[usize], rules: &FitRules) -> bool {
         let mut changed = false;
         for (e, &now) in errors.iter().enumerate() {
@@ -55,8 +55,8 @@ impl Spans {
 
     /// Gives patches whose smooth seams bend too much the spans that common planes take; whether any got more.
     ///
-    /// Along a seam the plane turns with the curve on it and with both patches, and a cubic cannot follow both of its sides
-    /// and the samples too. What leaves the tolerance for it is taken back by [`Self::refine`].
+    /// Along a seam the plane turns with the curve on it and with both patches, and a cubic cannot follow both of its
+    /// sides and the samples too. What leaves the tolerance for it is taken back by [`Self::refine`].
     pub(super) fn level(&mut self, seams: &[Seam], errors: &[f64], samples: &[usize], rules: &FitRules) -> bool {
         let Some(limit) = rules.smooth else { return false };
         let steep = seams.iter().filter(|seam| seam.is_smooth && seam.angle > limit && seam.angle < CREASE);

@@ -13,8 +13,9 @@ use crate::mesh::{FaceId, IdVec};
 
 /// The least number of faces that refining makes; more than `enough` is not told apart.
 ///
-/// Faces at a kept edge are left out: they, and what they force, may stay as they are. Where the limit varies in a face,
-/// its largest value there counts. Where edges are flipped, parts of different faces are joined, and only the area counts.
+/// Faces at a kept edge are left out: they, and what they force, may stay as they are. Where the limit varies in a
+/// face, its largest value there counts. Where edges are flipped, parts of different faces are joined, and only the
+/// area counts.
 pub(super) fn least_faces(round: &Round, max_edge: &MaxEdge, flips: Flips, enough: usize) -> usize {
     let surface = &round.surface;
     let mut at_kept: IdVec<Vertex, bool> = IdVec::filled(false, surface.points.len());

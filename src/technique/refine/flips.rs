@@ -8,8 +8,8 @@ use crate::mesh::id::Face;
 use crate::mesh::{FaceId, Field, IdVec, LockRules, Support, Surface, VertexId};
 use crate::technique::flat_flips::{Pair, flip_where, raises};
 
-/// A pair of faces counts as flat where its diagonals are nearer than this share of the largest coordinate: four roundings
-/// of single precision, which files such as STL have.
+/// A pair of faces counts as flat where its diagonals are nearer than this share of the largest coordinate: four
+/// roundings of single precision, which files such as STL have.
 const ROUNDING: f64 = 2.4e-7;
 /// And nearer than this share of the diagonal, however far from the origin the surface lies.
 const SHARE: f64 = 1e-6;
@@ -29,8 +29,8 @@ impl<'a> Flattener<'a> {
         Self { tolerance: (ROUNDING * extent).min(SHARE * diagonal), locks }
     }
 
-    /// Flips at vertices from number `first` on. After the first round no edge gets longer than both the one it replaces and
-    /// its limit, so the longest edge halves in each round as if nothing were flipped.
+    /// Flips at vertices from number `first` on. After the first round no edge gets longer than both the one it
+    /// replaces and its limit, so the longest edge halves in each round as if nothing were flipped.
     pub(super) fn flip(
         &self,
         surface: &mut Surface,

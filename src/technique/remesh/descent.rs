@@ -11,8 +11,8 @@ pub(super) const COMFORT: [(f64, f64); 3] = [(0.7, 0.88), (0.6, 0.83), (0.5, 0.7
 /// The same in smaller steps, where the mean stretch of all faces has a goal.
 const SMALL_STEPS: [(f64, f64); 5] = [(0.7, 0.88), (0.65, 0.855), (0.6, 0.83), (0.55, 0.805), (0.5, 0.78)];
 
-/// Further steps for meshes that the first ones hardly coarsen, such as grids of right-angled triangles, where the first
-/// collapse always makes its star less even.
+/// Further steps for meshes that the first ones hardly coarsen, such as grids of right-angled triangles, where the
+/// first collapse always makes its star less even.
 pub(super) const LESS_COMFORT: [(f64, f64); 2] = [(0.4, 0.65), (0.3, 0.5)];
 
 /// The part of the faces that must be gone for the further steps to be left out.

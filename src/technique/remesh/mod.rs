@@ -45,9 +45,9 @@ const LITTLE: f64 = 1e-4;
 
 /// Coarsens to the goal, or until no edge is valid, with optimisation in between.
 ///
-/// The stretch that new faces need starts high and falls in steps, so that poor collapses are only done when a number of
-/// faces asks for them; without one they are not done. Towards a mean stretch it goes down until evening out leaves little
-/// more than was asked for.
+/// The stretch that new faces need starts high and falls in steps, so that poor collapses are only done when a number
+/// of faces asks for them; without one they are not done. Towards a mean stretch it goes down until evening out leaves
+/// little more than was asked for.
 pub fn coarsen(editor: &mut Editor<'_>, rules: &CollapseRules, goal: Goal, watch: &Watch) -> Result<Ending, Cancelled> {
     let mut refusals = Refusals::default();
     let mut descent = Descent::new(editor, rules, goal);
@@ -76,8 +76,8 @@ fn regain_mean(editor: &mut Editor<'_>, goal: f64, least: f64, watch: &Watch) ->
     Ok(())
 }
 
-/// Rounds of optimisation after the last collapses. Faces that single edits can mend are mended before the mean is raised,
-/// and kept so, since repairs afterwards would lower it again.
+/// Rounds of optimisation after the last collapses. Faces that single edits can mend are mended before the mean is
+/// raised, and kept so, since repairs afterwards would lower it again.
 fn finish(
     editor: &mut Editor<'_>,
     rules: &CollapseRules,
@@ -89,8 +89,8 @@ fn finish(
     even_out(editor, BETTER.max(rules.min_stretch), watch)
 }
 
-/// Once more where faces are below the threshold still, and past it: what was done about their neighbours meanwhile, and
-/// what a higher aim changes round them, may have made room.
+/// Once more where faces are below the threshold still, and past it: what was done about their neighbours meanwhile,
+/// and what a higher aim changes round them, may have made room.
 fn mend_stubborn(editor: &mut Editor<'_>, rules: &CollapseRules, watch: &Watch) -> Result<(), Cancelled> {
     for aim in HIGHER_AIMS {
         let aim = aim * rules.min_stretch;
@@ -103,8 +103,8 @@ fn mend_stubborn(editor: &mut Editor<'_>, rules: &CollapseRules, watch: &Watch) 
     Ok(())
 }
 
-/// Raises the mean stretch where no face falls below `least` by it: flips towards regular valences, which only pay after
-/// the moves that follow, and moves to the centre of the star and then to the best place nearby.
+/// Raises the mean stretch where no face falls below `least` by it: flips towards regular valences, which only pay
+/// after the moves that follow, and moves to the centre of the star and then to the best place nearby.
 fn even_out(editor: &mut Editor<'_>, least: f64, watch: &Watch) -> Result<(), Cancelled> {
     watch.phase("even out", Some(EVENING as u64));
     let gain = Gain::Mean(least);

@@ -102,9 +102,9 @@ impl Editor<'_> {
         })
     }
 
-    /// Splits the edge at `at` where all tests admit it, and no face falls below the least stretch, or below the worst of
-    /// the old ones where one is there already. Losses of single splits would multiply where kept edges leave nothing to
-    /// mend them with.
+    /// Splits the edge at `at` where all tests admit it, and no face falls below the least stretch, or below the worst
+    /// of the old ones where one is there already. Losses of single splits would multiply where kept edges leave
+    /// nothing to mend them with.
     pub fn try_split(&mut self, edge: EdgeId, at: DVec3) -> Option<VertexId> {
         let plan = check_split(&self.mesh, edge).ok()?;
         let h = halfedge_of(edge);

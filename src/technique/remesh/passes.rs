@@ -121,8 +121,8 @@ pub(super) fn relax(editor: &mut Editor<'_>, v: VertexId, gain: Gain) -> bool {
     }
 }
 
-/// The way of a vertex to the area-weighted centroid of its star within the star's tangent plane, and the unit normal of
-/// that; `None` where the star has no area.
+/// The way of a vertex to the area-weighted centroid of its star within the star's tangent plane, and the unit normal
+/// of that; `None` where the star has no area.
 pub fn towards_centroid(mesh: &HalfedgeMesh, v: VertexId) -> Option<(DVec3, DVec3)> {
     let at = mesh.point(v);
     let (mut centre, mut normal, mut weight) = (DVec3::ZERO, DVec3::ZERO, 0.0);

@@ -2,9 +2,9 @@
 //!
 //! H. Date, S. Kanai, T. Kishinami, I. Nishigaki, T. Dohi (JCISE 5(4), 2005, section 5.2.1) ask for a first phase in
 //! which only edges that break the threshold collapse, until nothing does. Made precise: for each face below the
-//! threshold, worst first, the first of a collapse, a flip and a relocation that brings its star nearer to the threshold:
-//! the least stretch rises, or the sum of what the faces lack falls, and never does the least stretch fall. Where there
-//! is none, a search for a sequence of edits whose outcome does ([`super::search`]).
+//! threshold, worst first, the first of a collapse, a flip and a relocation that brings its star nearer to the
+//! threshold: the least stretch rises, or the sum of what the faces lack falls, and never does the least stretch fall.
+//! Where there is none, a search for a sequence of edits whose outcome does ([`super::search`]).
 
 use std::collections::BTreeMap;
 
@@ -122,8 +122,8 @@ fn age(editor: &Editor<'_>, f: FaceId) -> u64 {
     around.map(|v| u64::from(mesh.version(v))).sum()
 }
 
-/// The stretch a face should reach: `threshold`, or where curves meet in one of its corners too sharply for that, nearly
-/// the best that the corner allows.
+/// The stretch a face should reach: `threshold`, or where curves meet in one of its corners too sharply for that,
+/// nearly the best that the corner allows.
 pub(super) fn reachable(mesh: &HalfedgeMesh, f: FaceId, threshold: f64) -> f64 {
     let first = mesh.face_halfedge(f);
     let sides = [first, mesh.next(first), mesh.prev(first)];
@@ -178,7 +178,8 @@ fn mend(editor: &mut Editor<'_>, f: FaceId, rules: &CollapseRules) -> bool {
     false
 }
 
-/// Steps of a nudge, as shares of the shortest edge at the vertex for a free one, of the way to the neighbour on a curve.
+/// Steps of a nudge, as shares of the shortest edge at the vertex for a free one, of the way to the neighbour on a
+/// curve.
 const STEPS: [f64; 4] = [0.5, 0.25, 0.1, 0.03];
 
 /// Directions in the tangent plane that a nudge tries.

@@ -1,9 +1,9 @@
 //! Connectivity nearer to the regular one, where the shapes allow it.
 //!
 //! Faces are close to equilateral where each vertex has as many faces as its total angle holds sixth parts of a turn:
-//! 6 inside and on curves of a smooth surface, 3 on a border. Flips towards those valences are what relaxation then turns
-//! into better shapes (M. Botsch, L. Kobbelt, SGP 2004); they gain nothing at once, so that they are admitted where no
-//! face falls below [`FLOOR`], and must lower the sum of squared deviations, so that they end.
+//! 6 inside and on curves of a smooth surface, 3 on a border. Flips towards those valences are what relaxation then
+//! turns into better shapes (M. Botsch, L. Kobbelt, SGP 2004); they gain nothing at once, so that they are admitted
+//! where no face falls below [`FLOOR`], and must lower the sum of squared deviations, so that they end.
 
 use super::Gain;
 use crate::mesh::edit::check_flip;

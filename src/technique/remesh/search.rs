@@ -1,9 +1,9 @@
 //! A search for short sequences of edits that mend a face where no single edit does: two collapses that together close
 //! a wedge between curves, a split and a collapse that flatten a cap, a flip that makes way for a move.
 //!
-//! A beam search over copies of the face's surroundings ([`Cavity`]): of all edits at the worst faces the ones that leave
-//! least to mend are followed further, even if the first of them make things worse. Deterministic: ties keep their order.
-//! Cost: some 5000 edits tried on a copy, less than a tenth of a second a face; so it comes last.
+//! A beam search over copies of the face's surroundings ([`Cavity`]): of all edits at the worst faces the ones that
+//! leave least to mend are followed further, even if the first of them make things worse. Deterministic: ties keep
+//! their order. Cost: some 5000 edits tried on a copy, less than a tenth of a second a face; so it comes last.
 
 use glam::DVec3;
 

@@ -3,9 +3,9 @@
 //! R. Miyazaki and K. Harada, *Transformation of a closed 3D triangular mesh to a quadrilateral mesh based on feature
 //! edges*, section 3.3: the corners and crossings of a face in a loop, cut by one segment after the other. Nothing is
 //! computed but the order of points: crossings are shared by both faces of an edge, and two segments of a face cross if
-//! their ends alternate round it. Crossings near a vertex snap to it, which spares slivers; a crossing beside it on the way,
-//! from which the curve would turn along an edge, goes with it. The paper's fan of triangles
-//! may take three points of one side; here each cell is cut so that its worst triangle is best.
+//! their ends alternate round it. Crossings near a vertex snap to it, which spares slivers; a crossing beside it on the
+//! way, from which the curve would turn along an edge, goes with it. The paper's fan of triangles may take three points
+//! of one side; here each cell is cut so that its worst triangle is best.
 //!
 //! Invariants: all new vertices lie on old edges, so the surface stays as a point set; every segment of a curve is an
 //! edge; labels change over curves only, and each curve has its own labels on its sides. O(n log n) for n faces, and
@@ -126,8 +126,8 @@ struct Flank {
 type Flanks = FxHashMap<[VertexId; 2], Flank>;
 
 /// Cuts a surface along its `curves`. Points within the share `snap` of an edge from a vertex that no curve touches
-/// snap to it, and so do those from which the curve would then go along their edge; other points keep that distance from
-/// vertices and from each other where there is room.
+/// snap to it, and so do those from which the curve would then go along their edge; other points keep that distance
+/// from vertices and from each other where there is room.
 ///
 /// # Errors
 /// See [`SplitError`].

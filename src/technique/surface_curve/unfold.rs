@@ -7,8 +7,8 @@
 //! so covers flat, round and saddle vertices. Both moves never lengthen the path: where the target is out of reach, the
 //! way towards it is descent all along.
 //!
-//! Departure from Martínez et al.: where the straight line leaves the fan, the path bends at the fan's border instead of
-//! being cut off there, and it keeps a margin from other arcs and from vertices that it may not touch.
+//! Departure from Martínez et al.: where the straight line leaves the fan, the path bends at the fan's border instead
+//! of being cut off there, and it keeps a margin from other arcs and from vertices that it may not touch.
 
 use std::collections::BTreeMap;
 

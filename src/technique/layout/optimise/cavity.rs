@@ -1,8 +1,8 @@
 //! Cavities round irregular nodes are filled anew with as few irregular nodes as their rims allow.
 //!
 //! A cavity grows cell by cell, from an irregular node or from the way between two of them; whenever its rim turns like
-//! a polygon of two to six sides it may be filled by the patches of [`fill`](crate::technique::fill). So irregular nodes that lie apart cancel
-//! each other out, and of many that make up for one another two are left.
+//! a polygon of two to six sides it may be filled by the patches of [`fill`](crate::technique::fill). So irregular
+//! nodes that lie apart cancel each other out, and of many that make up for one another two are left.
 
 use std::collections::BTreeMap;
 
@@ -133,7 +133,8 @@ struct Seen {
 }
 
 impl Seen {
-    /// How many patches inside a node of the rim should have; `None` inside. A corner that leans gets its second choice.
+    /// How many patches inside a node of the rim should have; `None` inside. A corner that leans gets its second
+    /// choice.
     fn turn(&self, leans: bool) -> Option<i32> {
         let outside = self.patches - self.inside;
         let wanted = self.second.filter(|_| leans).unwrap_or(self.wanted);

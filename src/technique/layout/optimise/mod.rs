@@ -1,9 +1,9 @@
 //! Improves the connectivity of a layout: no triangles, four patches round inner nodes, two at smooth borders.
 //!
-//! Triangles walk through quads along shortest dual paths until two meet and become a quad; then local edits are made and
-//! cavities filled anew wherever that lowers the cost: the squared excess of patches at each node, more on borders. This
-//! is the objective of the clean-up in advancing-front quad meshing. Every edit is carried out in the mesh at once, so
-//! that the layout stays embedded.
+//! Triangles walk through quads along shortest dual paths until two meet and become a quad; then local edits are made
+//! and cavities filled anew wherever that lowers the cost: the squared excess of patches at each node, more on borders.
+//! This is the objective of the clean-up in advancing-front quad meshing. Every edit is carried out in the mesh at
+//! once, so that the layout stays embedded.
 //!
 //! Based on: P. Kinney. CleanUp: Improving Quadrilateral Finite Element Meshes. 6th International Meshing Roundtable,
 //! 1997. S. Owen, M. Staten, S. Canann, S. Saigal. Q-Morph: An Indirect Approach to Advancing Front Quad Meshing.
@@ -51,7 +51,8 @@ struct Memory {
 /// So many times all faces of the surface may be filled in vain.
 const PATIENCE: usize = 12;
 
-/// How many times as large as the first ones the cells of a cavity filled anew may be: what is coarser follows no shape.
+/// How many times as large as the first ones the cells of a cavity filled anew may be: what is coarser follows no
+/// shape.
 const LARGEST: f64 = 2.5;
 
 /// New cells of less quality are refused, unless the old ones were worse.

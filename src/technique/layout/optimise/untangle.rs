@@ -1,5 +1,5 @@
-//! Mends cells that are inverted, or nearly so, between straight edges, whatever surface they hold: their nodes move, and
-//! where that does not help the cells round them are cut another way.
+//! Mends cells that are inverted, or nearly so, between straight edges, whatever surface they hold: their nodes move,
+//! and where that does not help the cells round them are cut another way.
 
 use glam::DVec3;
 
@@ -47,8 +47,8 @@ impl Layout<'_> {
         self.straight(&self.nodes(cell), self.area(cell).normalize_or_zero())
     }
 
-    /// The quality of a cell along the normal of its patch, or of a quad along its own where that is less: between straight
-    /// edges a quad that spans a bend may be inverted, which the patch that it holds does not tell.
+    /// The quality of a cell along the normal of its patch, or of a quad along its own where that is less: between
+    /// straight edges a quad that spans a bend may be inverted, which the patch that it holds does not tell.
     fn straight(&self, nodes: &[VertexId], normal: DVec3) -> f64 {
         let quality = self.quality(nodes, normal);
         let &[a, b, c, d] = nodes else { return quality };
@@ -108,7 +108,8 @@ impl Layout<'_> {
         cells.iter().map(quality).fold(f64::INFINITY, f64::min)
     }
 
-    /// Where a node may go: vertices inside its cells, some from everywhere, or on the rim between its neighbours there.
+    /// Where a node may go: vertices inside its cells, some from everywhere, or on the rim between its neighbours
+    /// there.
     fn places(&self, node: VertexId, cells: &[u32]) -> Vec<VertexId> {
         /// Vertices looked at.
         const MOST: usize = 300;
@@ -161,7 +162,8 @@ mod tests {
 
     #[test]
     fn a_node_that_inverts_a_quad_moves_back_among_its_cells() {
-        // A square of four cells, whose common node lies so far out that one of them is inverted between straight edges.
+        // A square of four cells, whose common node lies so far out that one of them is inverted between straight
+        // edges.
         let points = (0..=N).flat_map(|y| (0..=N).map(move |x| glam::dvec3(f64::from(x), f64::from(y), 0.0))).collect();
         let corners = (0..N * N).map(|i| (i % N, i / N));
         let corners = corners.map(|(x, y)| [id(x, y), id(x + 1, y), id(x + 1, y + 1), id(x, y + 1)]);
