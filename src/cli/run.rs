@@ -307,7 +307,7 @@ pub(super) fn left_out(report: &Report) -> Vec<String> {
 }
 
 /// What steps say that their results lack.
-fn warnings(report: &Report) -> Vec<String> {
+pub(super) fn warnings(report: &Report) -> Vec<String> {
     let steps =
         report.cases.iter().flat_map(|case| case.steps.iter().map(move |step| (in_case(&case.name, &step.name), step)));
     let of = |(name, step): (String, &StepReport)| {

@@ -7,7 +7,7 @@ use super::Global;
 use super::context::{Planned, RecipeArguments, list_files, open_store, pair, plan_cases, protected};
 use super::exit::{Exit, Fault, data, document_text, say};
 use super::picture::{self, Pictures};
-use super::run::{folder, jobs_of, left_out, path_bytes, traced, write_record};
+use super::run::{folder, jobs_of, left_out, path_bytes, traced, warnings, write_record};
 use super::signals::Interrupt;
 use super::unchanged::Unchanged;
 use super::{goal, progress, report};
@@ -112,7 +112,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Fault>
         report::write(&report, Some(&table), &store, &[], &options.out.join("report.html"))?;
     }
     let mut said = tell(&table, arguments, global.quiet)?;
-    for line in left_out(&report) {
+    for line in [left_out(&report), warnings(&report)].concat() {
         say(&line);
         said.err.push(line);
     }

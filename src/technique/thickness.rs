@@ -1,7 +1,7 @@
 //! How thick the walls of a closed part are, looked at from sampled faces.
 //!
 //! A ray goes inward from the middle of a face to the first face that it meets from inside. Only the middles of up to
-//! [`SAMPLES`] faces are asked, evenly over the faces' numbers, each for its area: enough to tell that a part is a
+//! two thousand faces are asked, evenly over the faces' numbers, each for its area: enough to tell that a part is a
 //! sheet, not to find its one thin spot. O(n log n).
 
 use crate::mesh::bvh::{Ray, TriangleBvh};

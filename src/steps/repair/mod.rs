@@ -85,7 +85,7 @@ pub fn repair(soup: &Soup, params: &RepairParams, watch: &Watch) -> Result<(Surf
     }
     let crossing_size = params.crossing_size.map(|size| size.resolve(diagonal));
     count_intersections(&surface, soup, crossing_size, &mut stats, watch)?;
-    stats.warnings = near::beside_each_other(&surface).into_iter().collect();
+    stats.warnings = stats.taken_away().into_iter().chain(near::beside_each_other(&surface)).collect();
     Ok((surface, stats))
 }
 

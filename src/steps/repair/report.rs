@@ -92,6 +92,33 @@ pub struct RepairStats {
 }
 
 impl RepairStats {
+    /// What went without a parameter that asked for it, and holes that were to be filled and are not: the surface is
+    /// compared with this one from here on, so that no gate sees it.
+    pub(super) fn taken_away(&self) -> Vec<String> {
+        let mut said = Vec::new();
+        if self.cancelled_faces > 0 {
+            let count = self.cancelled_faces;
+            said.push(format!("{count} faces that lay on each other back to back and enclosed nothing were dropped"));
+        }
+        if self.slivers_dropped > 0 {
+            said.push(format!("{} faces without height were taken away at borders", self.slivers_dropped));
+        }
+        let reasons = [
+            (LoopFate::FoldsBack, "would fold back, as for the outline of a sheet"),
+            (LoopFate::Blocked, "would repeat an edge or a face"),
+            (LoopFate::Obstructed, "would run through the surface"),
+            (LoopFate::Slit, "would have no area, which a larger weld length closes"),
+        ];
+        for (fate, reason) in reasons {
+            let count = self.loops.iter().filter(|border| border.fate == fate).count();
+            if count > 0 {
+                let more = if self.boundary_loops as usize > self.loops.len() { "at least " } else { "" };
+                said.push(format!("{more}{count} of {} holes stay open: every fill {reason}", self.boundary_loops));
+            }
+        }
+        said
+    }
+
     /// Adds what a further round did to the result of the rounds before.
     pub(super) fn go_on(&mut self, more: Self) {
         self.rounds += more.rounds;
@@ -273,5 +300,24 @@ impl From<RepairError> for StepFailure {
                 .with_help("look at the faces named, and remove or separate them in the program that made the mesh")
                 .with_elements(vec![element(face, Some(at))]),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_went_unasked_and_what_stays_open_is_told() {
+        let border = |fate| LoopStats { edges: 4, length: 1.0, centre: [0.0; 3], fate };
+        let stats = RepairStats {
+            cancelled_faces: 2,
+            boundary_loops: 3,
+            loops: [LoopFate::Filled, LoopFate::Slit, LoopFate::Open].map(border).into(),
+            ..RepairStats::default()
+        };
+        let said = stats.taken_away();
+        assert!(said.len() == 2 && said[0].starts_with("2 faces") && said[1].starts_with("1 of 3 holes"), "{said:?}");
+        assert_eq!(RepairStats::default().taken_away(), [""; 0]);
     }
 }
