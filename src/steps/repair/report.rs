@@ -5,6 +5,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::mesh::FaceId;
+use crate::metric::number::number_text;
 use crate::step::{ElementRef, StepFailure};
 use crate::watch::Cancelled;
 
@@ -236,8 +237,10 @@ pub enum RepairError {
     },
     /// Bodies run through each other.
     #[error(
-        "faces run through each other in {pairs} places, along {length:.3e} in all: elements with edges of {size:.3e} would do \
-         so in about {expected} places, so that no gate against new intersections can pass"
+        "faces run through each other in {pairs} places, along {} in all, so that this is no solid: elements with edges of \
+         {} would do so in about {expected} places",
+        number_text(*.length),
+        number_text(*.size)
     )]
     RunsThrough {
         /// Pairs of faces.
@@ -291,7 +294,7 @@ impl From<RepairError> for StepFailure {
             RepairError::RunsThrough { worst, .. } => Self::failed(message)
                 .with_help(
                     "join the bodies in the program that made them, or mesh each by itself; \
-                     `crossing-size` = \"100%\" lets them through as they are",
+                     `crossing-size` = \"100%\" lets them through, and gates see to it that they cross nowhere else",
                 )
                 .with_elements(worst.into_iter().map(|(f, at)| element(FaceId::from_raw(f), Some(at))).collect()),
             RepairError::BadFace { face } => Self::bad_input(message).with_elements(vec![element(face, None)]),
