@@ -382,45 +382,22 @@ impl<'a> Schedule<'a> {
         let mut files = Vec::new();
         for (node, what) in self.nodes.iter().enumerate() {
             let Filed { state, content, notes, failure } = self.files.remove(&node).unwrap_or_default();
-            match *what {
-                Node::Task(_) => {}
+            let (case, step, task, (path, passed)) = match *what {
+                Node::Task(_) => continue,
                 Node::File(case, position) => {
                     let output = &self.shared.plan.cases()[case].outputs[position];
                     let fallback = || (self.shared.folder(case).join(&output.file), true);
-                    let (path, passed) = output::place(self.shared, case, output).unwrap_or_else(fallback);
-                    let (step, task) = (output.step.clone(), output.task);
-                    files.push(FileOutcome {
-                        case,
-                        step,
-                        task,
-                        path,
-                        state,
-                        content,
-                        failed_gate: !passed,
-                        notes,
-                        failure,
-                    });
+                    let place = output::place(self.shared, case, output).unwrap_or_else(fallback);
+                    (case, output.step.clone(), output.task, place)
                 }
+                Node::Faults(..) if content.is_none() && failure.is_none() => continue,
                 Node::Faults(case, position) => {
-                    if content.is_none() && failure.is_none() {
-                        continue;
-                    }
                     let gate = &self.shared.plan.cases()[case].gates[position];
                     let path = output::faults_place(self.shared, case, position);
-                    let (step, task) = (gate.step.clone(), gate.target);
-                    files.push(FileOutcome {
-                        case,
-                        step,
-                        task,
-                        path,
-                        state,
-                        content,
-                        failed_gate: true,
-                        notes,
-                        failure,
-                    });
+                    (case, gate.step.clone(), gate.target, (path, false))
                 }
-            }
+            };
+            files.push(FileOutcome { case, step, task, path, state, content, failed_gate: !passed, notes, failure });
         }
         RunOutcome {
             tasks: self.tasks,

@@ -399,7 +399,7 @@ pub struct Step;
 
 impl crate::step::Step for Step {
     const NAME: &'static str = "improve-quality";
-    const REVISION: u32 = 16;
+    const REVISION: u32 = 17;
     const INPUTS: &'static [InputDef] = &[
         InputDef { name: "from", accepts: &[Port::Surface], required: true, doc: "the surface to improve" },
         InputDef {

@@ -81,3 +81,16 @@ fn both_sheets_of_a_seam_change_alike() {
         assert_eq!(twins.count(), 2, "vertex {vertex} has lost its twin");
     }
 }
+
+#[test]
+fn the_needles_of_a_washer_go() {
+    // They go only where a split may make a face worse for a while.
+    let washer = surface(shapes::surface(&shapes::washer(20)));
+    let marked = run("features", "angle = 35", &washer).artifact;
+    let made = run("control-properties", "max-size = \"25%\", tolerance = \"2%\"", &marked).artifact;
+    let least = |mesh: &meshmill::step::Artifact| {
+        let measured = metric::measure(&mesh.to_soup().unwrap(), None, &Watch::silent()).unwrap();
+        measured.get("min-stretch").unwrap().as_f64()
+    };
+    assert!(least(&marked) < 0.1 && least(&made) > 0.4, "{} after {}", least(&made), least(&marked));
+}

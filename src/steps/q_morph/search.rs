@@ -184,6 +184,16 @@ impl Asked {
 mod tests {
     use super::*;
 
+    const RULES: Rules = Rules {
+        tolerance: 0.1,
+        curve_tolerance: 0.1,
+        shortest: 0.0,
+        least_size: 0.1,
+        floor: 1e-3,
+        gradation: 0.3,
+        most_faces: usize::MAX,
+    };
+
     #[test]
     fn what_got_better_is_asked_for_afresh() {
         let asked = Asked { failures: vec![1, 1, 0, 0], regions: vec![true, true, true, false], wishes: Vec::new() };
@@ -208,33 +218,24 @@ mod tests {
 
     #[test]
     fn a_detour_goes_on_from_worse_attempts_and_is_blamed_once() {
-        let rules = Rules {
-            tolerance: 0.1,
-            curve_tolerance: 0.1,
-            shortest: 0.0,
-            least_size: 0.1,
-            floor: 1e-3,
-            gradation: 0.3,
-            most_faces: usize::MAX,
-        };
         let mut search = Search::new(attempt([1.0, 1.0]));
-        let first = search.places(rules);
+        let first = search.places(RULES);
         assert_eq!(first.len(), 2);
         // Worse: the first region got better, the second worse.
         learn(&mut search, Some([0.5, 2.0]));
         assert_eq!(search.from().by_region, [0.5, 2.0], "it goes on from there");
         assert_eq!(search.asked.failures, [0, 1]);
         for _ in 0..2 {
-            assert!(!search.places(rules).is_empty());
+            assert!(!search.places(RULES).is_empty());
             learn(&mut search, Some([0.5, 1.9]));
         }
         assert!(search.detour.is_some());
-        search.places(rules);
+        search.places(RULES);
         learn(&mut search, Some([0.5, 1.8]));
         assert!(search.detour.is_none(), "three steps are enough");
         assert_eq!(search.from().by_region, [1.0, 1.0], "the best is kept");
         assert_eq!(search.asked.failures, [0, 1], "the detour counts once");
-        let second = search.places(rules);
+        let second = search.places(RULES);
         assert_eq!(second.len(), 2);
         assert!(second[1].2 < first[1].2, "smaller where it failed");
         learn(&mut search, Some([0.1, 0.2]));
@@ -246,33 +247,16 @@ mod tests {
         let square = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(|[x, y]| glam::dvec3(x, y, 0.0));
         let quads = crate::technique::mixed::Mixed::of_faces(&square, &[&[0, 1, 2, 3]]).unwrap();
         let mut crossed = Attempt { quads, lack: 0.1, by_region: vec![0.1], ..Attempt::default() };
-        let rules = Rules {
-            tolerance: 0.1,
-            curve_tolerance: 0.1,
-            shortest: 0.0,
-            least_size: 0.1,
-            floor: 1e-3,
-            gradation: 0.3,
-            most_faces: usize::MAX,
-        };
         assert!(crossed.is_good());
         crossed.flaws.crossing.push(0);
         assert!(!crossed.is_good() && !crossed.is_fair());
-        let places = Search::new(crossed).places(rules);
+        let places = Search::new(crossed).places(RULES);
         assert_eq!(places, [(glam::dvec3(0.5, 0.5, 0.0), 1.2, ROOM)]);
     }
 
     #[test]
     fn the_same_is_not_asked_twice() {
-        let rules = Rules {
-            tolerance: 0.1,
-            curve_tolerance: 0.1,
-            shortest: 0.0,
-            least_size: 9.0,
-            floor: 9.0,
-            gradation: 0.3,
-            most_faces: usize::MAX,
-        };
+        let rules = Rules { least_size: 9.0, floor: 9.0, ..RULES };
         let mut search = Search::new(attempt([1.0, 1.0]));
         assert_eq!(search.places(rules).len(), 2);
         learn(&mut search, None);

@@ -32,6 +32,9 @@ pub enum Gain {
     None,
 }
 
+/// What a split may leave of a stretch that is below the threshold already.
+const SPLIT_LOSS: f64 = 0.25;
+
 impl Editor<'_> {
     /// Flips the edge where all tests admit it and it gains.
     pub fn try_flip(&mut self, edge: EdgeId, gain: Gain) -> bool {
@@ -102,9 +105,9 @@ impl Editor<'_> {
         })
     }
 
-    /// Splits the edge at `at` where all tests admit it, and no face falls below the least stretch, or below the worst
-    /// of the old ones where one is there already. Losses of single splits would multiply where kept edges leave
-    /// nothing to mend them with.
+    /// Splits the edge at `at` where all tests admit it, and no face falls below the least stretch. Where one is there
+    /// already, the halves may be a little worse, since more can be done with them; not beside kept edges, where
+    /// nothing can, and the losses of single splits multiply.
     pub fn try_split(&mut self, edge: EdgeId, at: DVec3) -> Option<VertexId> {
         let plan = check_split(&self.mesh, edge).ok()?;
         let h = halfedge_of(edge);
@@ -151,9 +154,19 @@ impl Editor<'_> {
         Some(v)
     }
 
+    /// Whether an edge of the face must stay as it is, so that nothing can be mended there.
+    fn is_beside_kept(&self, face: FaceId) -> bool {
+        let first = self.mesh.face_halfedge(face);
+        let sides = [first, self.mesh.next(first), self.mesh.prev(first)];
+        sides.iter().any(|&side| self.mesh.edge_freedom(edge_of(side)) == Freedom::Keep)
+    }
+
     fn split_keeps_stretch(&self) -> bool {
         let before = self.patch.old.iter().map(|&f| self.stretch(f)).fold(f64::INFINITY, f64::min);
-        let floor = least_stretch(self.limits.min_stretch, before);
+        let limit = self.limits.min_stretch;
+        let floor = least_stretch(limit, before);
+        let may_lose = floor < limit && !self.patch.old.iter().any(|&face| self.is_beside_kept(face));
+        let floor = if may_lose { SPLIT_LOSS * floor } else { floor };
         self.patch.points.iter().all(|points| stretch(*points) >= floor)
     }
 
