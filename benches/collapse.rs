@@ -12,7 +12,7 @@ use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_m
 use meshmill::mesh::{LockRules, Surface};
 use meshmill::step::Length;
 use meshmill::steps::control_properties::{ControlPropertiesInput, ControlPropertiesParams, control_properties};
-use meshmill::technique::collapse::session::ToleranceMode;
+use meshmill::technique::guarded::ToleranceMode;
 use meshmill::watch::Watch;
 
 fn params(mode: ToleranceMode, optimize: bool, target: usize) -> ControlPropertiesParams {

@@ -7,7 +7,7 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use meshmill::mesh::{Hierarchy, LockRules, Surface};
 use meshmill::step::Length;
 use meshmill::steps::control_properties::{ControlPropertiesInput, ControlPropertiesParams, record_properties};
-use meshmill::technique::collapse::session::ToleranceMode;
+use meshmill::technique::guarded::ToleranceMode;
 use meshmill::technique::hierarchy::{Density, Front, curvature_thresholds, extract};
 use meshmill::watch::Watch;
 

@@ -15,7 +15,7 @@ use meshmill::steps::control_properties::{
 };
 use meshmill::steps::improve_quality::{ImproveQualityInput, ImproveQualityParams, record_quality};
 use meshmill::steps::resolution::{ResolutionError, ResolutionParams, resolution};
-use meshmill::technique::collapse::session::ToleranceMode;
+use meshmill::technique::guarded::ToleranceMode;
 use meshmill::technique::hierarchy::{Front, extract};
 use meshmill::watch::Watch;
 

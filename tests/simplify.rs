@@ -11,7 +11,7 @@ use meshmill::steps::control_properties::{
     ControlPropertiesInput, ControlPropertiesParams, ControlPropertiesStats, OnInfeasible, Status, control_properties,
 };
 use meshmill::steps::improve_quality::{ImproveQualityInput, ImproveQualityParams, improve_quality};
-use meshmill::technique::collapse::session::{Cause, ToleranceMode};
+use meshmill::technique::guarded::{Cause, ToleranceMode};
 use meshmill::watch::Watch;
 
 fn surface(points: Vec<DVec3>, faces: &[[usize; 3]]) -> Surface {

@@ -226,6 +226,44 @@ fn techniques_form_no_circle() {
     }
 }
 
+/// The one door of guarded edits: its fields are open to its own folder only, so that nothing else can change the mesh.
+#[test]
+fn guarded_meshes_have_one_door() {
+    let mut faults = Vec::new();
+    for path in rust_files("src/technique/guarded") {
+        let text = fs::read_to_string(&path).expect("readable source");
+        for (number, line) in code_lines(&text) {
+            let is_open = line.contains("pub(in crate::technique)") || line.contains("pub(crate)");
+            if is_open {
+                faults.push(format!("{}:{number}: open beyond the folder", relative(&path)));
+            }
+        }
+    }
+    let door = fs::read_to_string(root().join("src/technique/guarded/mesh.rs")).expect("the guarded mesh");
+    let (_, body) = door.split_once("pub struct GuardedMesh<'a> {").expect("its type");
+    let fields = body.split_once("\n}").map_or(body, |(fields, _)| fields);
+    let open = fields.lines().filter(|line| line.trim_start().starts_with("pub "));
+    faults.extend(open.map(|line| format!("src/technique/guarded/mesh.rs: the field `{}` is public", line.trim())));
+    let rooms = fs::read_to_string(root().join("src/technique/guarded/mod.rs")).expect("its folder");
+    let doors = code_lines(&rooms).filter(|(_, line)| line.trim_start().starts_with("pub mod"));
+    faults.extend(doors.map(|(number, _)| format!("src/technique/guarded/mod.rs:{number}: a module is public")));
+    assert!(faults.is_empty(), "ways round the door:\n{}", faults.join("\n"));
+}
+
+/// Collapse is below remeshing, and both below the steps; the guarded mesh knows none of them.
+#[test]
+fn guarded_edits_are_used_from_above_only() {
+    for (own, above) in [("guarded", &["collapse", "remesh"][..]), ("collapse", &["remesh"])] {
+        for path in rust_files(&format!("src/technique/{own}")) {
+            let text = fs::read_to_string(&path).expect("readable source");
+            for (number, line) in code_lines(&text) {
+                let used = above.iter().find(|other| line.contains(&format!("technique::{other}")));
+                assert!(used.is_none(), "{}:{number}: `{own}` uses `{used:?}`", relative(&path));
+            }
+        }
+    }
+}
+
 #[test]
 fn no_file_is_longer_than_500_lines() {
     let mut faults = Vec::new();

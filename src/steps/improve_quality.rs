@@ -30,9 +30,9 @@ use crate::mesh::{FreedomError, Hierarchy, IdVec, LockRules, Surface, resolve_fr
 use crate::step::{
     Artifact, InputDef, Inputs, Length, Locks, OutPort, OutputDef, Port, Produced, ResolvedSizing, Sizing, StepFailure,
 };
-use crate::technique::collapse::session::{Setup, ToleranceMode, diagonal, open, recount, reference_tree};
-use crate::technique::collapse::{
-    CollapseRules, Counts, Editor, Ending, Goal, Limits, Order, Priority, SizeField, simplify,
+use crate::technique::collapse::{CollapseRules, Ending, Goal, Order, Priority, simplify};
+use crate::technique::guarded::{
+    Counts, GuardedMesh, Limits, Setup, SizeField, StarRules, ToleranceMode, diagonal, open, recount, reference_tree,
 };
 use crate::technique::hierarchy::{Front, extract};
 use crate::technique::levels::{HierarchyReport, Recorded, Source, build};
@@ -200,16 +200,16 @@ pub fn improve_quality(
     let freedom = resolve_freedom(surface, &input.locks)?;
     let setup = setup(&input, params, sizing, scale)?;
     let tree = reference_tree(params.tolerance_mode, input.reference);
-    let mut editor = open(surface, &freedom, input.reference, &tree, setup.clone())?;
-    let ending = run_phases(&mut editor, params, watch)?;
-    let counts = editor.counts();
+    let mut guarded = open(surface, &freedom, input.reference, &tree, setup.clone())?;
+    let ending = run_phases(&mut guarded, params, watch)?;
+    let counts = guarded.counts();
     let distance_bound = if lies_on_reference(&input) && counts.edits() == 0 {
         // Refinement alone leaves the surface the same set of points.
-        editor.distance_bound(setup.tolerance).map(|_| 0.0)
+        guarded.distance_bound(setup.tolerance).map(|_| 0.0)
     } else {
-        editor.distance_bound(setup.tolerance)
+        guarded.distance_bound(setup.tolerance)
     };
-    let mut result = editor.into_mesh().leave().surface;
+    let mut result = guarded.into_mesh().leave().surface;
     inherit_fields(surface, &mut result);
     let target_reached = params.target_faces.is_none() || ending == Ending::Target;
     let end = End { target_reached, faces_refined: surface.faces.len(), counts, distance_bound };
@@ -298,9 +298,7 @@ fn stats(
 fn rules(params: &ImproveQualityParams) -> CollapseRules {
     let is_certified = params.tolerance_mode == ToleranceMode::Distance;
     CollapseRules {
-        min_stretch: FLOOR,
-        mean_stretch: 0.0,
-        mend_below: None,
+        star: StarRules { min_stretch: FLOOR, ..StarRules::default() },
         order: if is_certified { Order::OnSurface } else { Order::Printed },
         priority: Priority::QualityGain,
     }
@@ -310,10 +308,14 @@ fn optimises(params: &ImproveQualityParams) -> bool {
     params.optimize.unwrap_or(params.tolerance_mode == ToleranceMode::Distance)
 }
 
-fn run_phases(editor: &mut Editor<'_>, params: &ImproveQualityParams, watch: &Watch) -> Result<Ending, Cancelled> {
+fn run_phases(
+    guarded: &mut GuardedMesh<'_>,
+    params: &ImproveQualityParams,
+    watch: &Watch,
+) -> Result<Ending, Cancelled> {
     let rules = rules(params);
     let goal = Goal { faces: params.target_faces.unwrap_or(0), ..Goal::default() };
-    if optimises(params) { coarsen(editor, &rules, goal, watch) } else { simplify(editor, &rules, goal, watch) }
+    if optimises(params) { coarsen(guarded, &rules, goal, watch) } else { simplify(guarded, &rules, goal, watch) }
 }
 
 /// Selective subdivision; `None` where nothing was asked for.

@@ -16,6 +16,7 @@ pub mod fit;
 pub mod flat_flips;
 pub mod front;
 pub mod ground;
+pub mod guarded;
 pub mod halve_edges;
 pub mod heap;
 pub mod hierarchy;

@@ -41,8 +41,10 @@ use crate::mesh::{FaceId, Hierarchy, LockRules, Surface, resolve_freedom};
 use crate::step::{
     Artifact, InputDef, Inputs, Length, Locks, OutPort, OutputDef, Port, Produced, ResolvedSizing, Sizing, StepFailure,
 };
-use crate::technique::collapse::session::{Setup, ToleranceMode, diagonal, open, reference_tree};
-use crate::technique::collapse::{CollapseRules, Editor, Ending, Goal, Limits, Order, Priority, SizeField, simplify};
+use crate::technique::collapse::{CollapseRules, Ending, Goal, Order, Priority, simplify};
+use crate::technique::guarded::{
+    GuardedMesh, Limits, Setup, SizeField, StarRules, ToleranceMode, diagonal, open, reference_tree,
+};
 use crate::technique::hierarchy::{Front, extract};
 use crate::technique::levels::{HierarchyReport, Recorded, Source, build};
 use crate::technique::refine::MAX_FACES;
@@ -155,11 +157,11 @@ pub fn control_properties(
     let tree = reference_tree(params.tolerance_mode, input.reference);
     let setup = setup(&input, params, diagonal(input.reference))?;
     let simplified = |mean_stretch: f64| -> Result<(Surface, ControlPropertiesStats), ControlPropertiesError> {
-        let mut editor = open(input.surface, &freedom, input.reference, &tree, setup.clone())?;
-        let ending = run_phases(&mut editor, params, mean_stretch, watch)?;
-        let counts = editor.counts();
-        let distance_bound = editor.distance_bound(setup.tolerance);
-        let mut result = editor.into_mesh().leave().surface;
+        let mut guarded = open(input.surface, &freedom, input.reference, &tree, setup.clone())?;
+        let ending = run_phases(&mut guarded, params, mean_stretch, watch)?;
+        let counts = guarded.counts();
+        let distance_bound = guarded.distance_bound(setup.tolerance);
+        let mut result = guarded.into_mesh().leave().surface;
         inherit_fields(input.surface, &mut result);
         let stats = stats(&input, params, &setup, &result, End { ending, counts, distance_bound })?;
         Ok((result, stats))
@@ -215,9 +217,7 @@ pub fn record_properties(
 fn rules(params: &ControlPropertiesParams) -> CollapseRules {
     let is_certified = params.tolerance_mode == ToleranceMode::Distance;
     CollapseRules {
-        min_stretch: params.min_stretch,
-        mean_stretch: 0.0,
-        mend_below: None,
+        star: StarRules { min_stretch: params.min_stretch, ..StarRules::default() },
         order: if is_certified { Order::OnSurface } else { Order::Printed },
         priority: Priority::SmallFirst { size: 1.0 },
     }
@@ -228,18 +228,18 @@ fn optimises(params: &ControlPropertiesParams) -> bool {
 }
 
 fn run_phases(
-    editor: &mut Editor<'_>,
+    guarded: &mut GuardedMesh<'_>,
     params: &ControlPropertiesParams,
     mean_stretch: f64,
     watch: &Watch,
 ) -> Result<Ending, Cancelled> {
     let rules = rules(params);
     let goal = Goal { faces: params.target_faces.unwrap_or(0), mean_stretch };
-    raise_stretch(editor, params.min_stretch, &rules, watch)?;
+    raise_stretch(guarded, params.min_stretch, &rules, watch)?;
     if !optimises(params) {
-        return simplify(editor, &rules, goal, watch);
+        return simplify(guarded, &rules, goal, watch);
     }
-    coarsen(editor, &rules, goal, watch)
+    coarsen(guarded, &rules, goal, watch)
 }
 
 fn setup(

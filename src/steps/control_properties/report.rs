@@ -7,8 +7,8 @@ use super::{ControlPropertiesInput, ControlPropertiesParams};
 use crate::mesh::halfedge::EnterError;
 use crate::mesh::{FreedomError, Surface, resolve_freedom};
 use crate::step::StepFailure;
-use crate::technique::collapse::session::{Cause, Recount, Setup, Threshold, Violation, recount};
-use crate::technique::collapse::{Counts, Ending};
+use crate::technique::collapse::Ending;
+use crate::technique::guarded::{Cause, Counts, Recount, Setup, Threshold, Violation, recount};
 use crate::technique::levels::HierarchyReport;
 use crate::watch::Cancelled;
 

@@ -10,8 +10,9 @@ use crate::mesh::geometry::{area_vector, aspect_ratio};
 use crate::mesh::halfedge::{edge_of, halfedge_of};
 use crate::mesh::{EdgeId, FaceId, VertexId};
 use crate::technique::aspect_point::AspectPoint;
-use crate::technique::collapse::{CollapseRules, Editor, Merge};
+
 use crate::technique::dispersion::{amended_length, vertex_dispersion};
+use crate::technique::guarded::{GuardedMesh, Merge, StarRules};
 
 /// Positions that get the costly tests, best first.
 pub(super) const MOST_TRIED: usize = 2;
@@ -45,7 +46,7 @@ pub(super) enum Outcome {
 
 /// The workshop with what the cases look at.
 pub(super) struct Bench<'e, 'a> {
-    pub(super) editor: &'e mut Editor<'a>,
+    pub(super) guarded: &'e mut GuardedMesh<'a>,
     pub(super) params: &'e SimplifyFitParams,
     pub(super) surfaces: &'e mut Surfaces,
     pub(super) dispersion: Vec<f32>,
@@ -65,7 +66,7 @@ impl Bench<'_, '_> {
 
     /// Computes the dispersion of a vertex anew.
     pub(super) fn update(&mut self, v: VertexId) {
-        let value = vertex_dispersion(self.editor.mesh(), v, self.params.dispersion) as f32;
+        let value = vertex_dispersion(self.guarded.mesh(), v, self.params.dispersion) as f32;
         if v.index() >= self.dispersion.len() {
             self.dispersion.resize(v.index() + 1, 0.0);
         }
@@ -74,7 +75,7 @@ impl Bench<'_, '_> {
 
     /// Computes all dispersions anew.
     pub(super) fn update_all(&mut self) {
-        let vertices: Vec<VertexId> = self.editor.mesh().vertices().collect();
+        let vertices: Vec<VertexId> = self.guarded.mesh().vertices().collect();
         for v in vertices {
             self.update(v);
         }
@@ -82,7 +83,7 @@ impl Bench<'_, '_> {
 
     /// A vertex that something else moved keeps its fit only where it still lies on it.
     pub(super) fn settle_fit(&mut self, v: VertexId) {
-        let at = self.editor.mesh().point(v);
+        let at = self.guarded.mesh().point(v);
         let fit = self.surfaces.number(v);
         self.keep_fit(v, at, fit, true);
         let origins = self.surfaces.origins(&[v]);
@@ -91,14 +92,14 @@ impl Bench<'_, '_> {
     }
 
     pub(super) fn edge_length(&self, e: EdgeId) -> f64 {
-        let mesh = self.editor.mesh();
+        let mesh = self.guarded.mesh();
         let [a, b] = mesh.ends(e).map(|v| mesh.point(v));
         a.distance(b)
     }
 
     /// The sides of a face, shortest first; ties by number.
     fn sides(&self, f: FaceId) -> [(f64, EdgeId); 3] {
-        let mesh = self.editor.mesh();
+        let mesh = self.guarded.mesh();
         let h = mesh.face_halfedge(f);
         let mut sides = [h, mesh.next(h), mesh.prev(h)].map(|h| (self.edge_length(edge_of(h)), edge_of(h)));
         sides.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
@@ -107,7 +108,7 @@ impl Bench<'_, '_> {
 
     /// Equation 6 with the largest dispersion of the corners.
     pub(super) fn amended(&self, f: FaceId) -> f64 {
-        let mesh = self.editor.mesh();
+        let mesh = self.guarded.mesh();
         let [a, b, c] = mesh.corner_points(f);
         let squared = (b - a).length_squared().min((c - b).length_squared()).min((a - c).length_squared());
         let most = mesh.corners(f).into_iter().map(|v| self.dispersion(v)).fold(0.0, f64::max);
@@ -115,9 +116,9 @@ impl Bench<'_, '_> {
     }
 
     /// Does what the case of the face asks for.
-    pub(super) fn act(&mut self, f: FaceId, l0: f64, rules: &CollapseRules) -> Outcome {
+    pub(super) fn act(&mut self, f: FaceId, l0: f64, rules: &StarRules) -> Outcome {
         let threshold = self.params.dispersion_threshold.radians();
-        let corners = self.editor.mesh().corners(f);
+        let corners = self.guarded.mesh().corners(f);
         let above: SmallVec<[VertexId; 3]> = corners.into_iter().filter(|&v| self.dispersion(v) > threshold).collect();
         let sides = self.sides(f);
         let p = self.params;
@@ -133,11 +134,11 @@ impl Bench<'_, '_> {
     }
 
     fn is_fine(&self, f: FaceId) -> bool {
-        aspect_ratio(self.editor.mesh().corner_points(f)) <= self.params.fine_aspect
+        aspect_ratio(self.guarded.mesh().corner_points(f)) <= self.params.fine_aspect
     }
 
     /// Case 1: a flat area. Where the shortest side may not go, the next one below the same length may.
-    fn flat(&mut self, f: FaceId, sides: &[(f64, EdgeId); 3], most: f64, rules: &CollapseRules) -> Outcome {
+    fn flat(&mut self, f: FaceId, sides: &[(f64, EdgeId); 3], most: f64, rules: &StarRules) -> Outcome {
         if self.is_fine(f)
             && let Some(v) = self.merge_face(f, rules, false)
         {
@@ -160,9 +161,9 @@ impl Bench<'_, '_> {
         corner: VertexId,
         sides: &[(f64, EdgeId); 3],
         l0: f64,
-        rules: &CollapseRules,
+        rules: &StarRules,
     ) -> Outcome {
-        let mesh = self.editor.mesh();
+        let mesh = self.guarded.mesh();
         let first = mesh.face_halfedge(f);
         let h = [first, mesh.next(first), mesh.prev(first)].into_iter().find(|&h| mesh.apex(h) == Some(corner));
         let Some(opposite) = h.map(edge_of) else { return Outcome::Refused };
@@ -188,9 +189,9 @@ impl Bench<'_, '_> {
     }
 
     /// Case 3: two corners on a feature. Along it with the optimised point, else onto the end that is on it.
-    fn along(&mut self, above: &[VertexId], sides: &[(f64, EdgeId); 3], rules: &CollapseRules) -> Outcome {
+    fn along(&mut self, above: &[VertexId], sides: &[(f64, EdgeId); 3], rules: &StarRules) -> Outcome {
         let (_, e) = sides[0];
-        let ends = self.editor.mesh().ends(e);
+        let ends = self.guarded.mesh().ends(e);
         if ends.iter().all(|v| above.contains(v)) {
             if let Some(v) = self.merge_edge(e, rules, self.on_surface(ends)) {
                 self.done.cases[2][1] += 1;
@@ -214,7 +215,7 @@ impl Bench<'_, '_> {
     }
 
     /// Case 4: a transitional surface, as fillets are: the optimised point goes onto a fit.
-    fn transitional(&mut self, f: FaceId, sides: &[(f64, EdgeId); 3], most: f64, rules: &CollapseRules) -> Outcome {
+    fn transitional(&mut self, f: FaceId, sides: &[(f64, EdgeId); 3], most: f64, rules: &StarRules) -> Outcome {
         if self.is_fine(f)
             && let Some(v) = self.merge_face(f, rules, true)
         {
@@ -230,22 +231,22 @@ impl Bench<'_, '_> {
         Outcome::Refused
     }
 
-    fn merge_face(&mut self, f: FaceId, rules: &CollapseRules, fits: bool) -> Option<VertexId> {
-        let merge = self.editor.plan_face(f, rules)?;
-        let corners = self.editor.mesh().corner_points(f);
-        let best = AspectPoint::new(self.editor.rim()).on_triangle(corners);
+    fn merge_face(&mut self, f: FaceId, rules: &StarRules, fits: bool) -> Option<VertexId> {
+        let merge = self.guarded.plan_face(f, rules).ok()?;
+        let corners = self.guarded.mesh().corner_points(f);
+        let best = AspectPoint::new(self.guarded.rim()).on_triangle(corners);
         let [a, b, c] = corners;
         let mut wishes: SmallVec<[DVec3; 6]> = SmallVec::from_slice(&[best, (a + b + c) / 3.0, a, b, c]);
         self.sort(&merge, &mut wishes);
-        self.place(&merge, &wishes, area_vector(corners), fits.then_some([Kind::Sphere, Kind::Cylinder]), rules)
+        self.place(&merge, &wishes, area_vector(corners), fits.then_some([Kind::Sphere, Kind::Cylinder]))
     }
 
-    fn merge_edge(&mut self, e: EdgeId, rules: &CollapseRules, fits: bool) -> Option<VertexId> {
-        let merge = self.editor.plan_edge(e, rules)?;
-        let mesh = self.editor.mesh();
+    fn merge_edge(&mut self, e: EdgeId, rules: &StarRules, fits: bool) -> Option<VertexId> {
+        let merge = self.guarded.plan_edge(e, rules).ok()?;
+        let mesh = self.guarded.mesh();
         let h = halfedge_of(e);
         let (a, b) = (mesh.point(mesh.origin(h)), mesh.point(mesh.target(h)));
-        let t = AspectPoint::new(self.editor.rim()).on_segment(a, b);
+        let t = AspectPoint::new(self.guarded.rim()).on_segment(a, b);
         let normal: DVec3 = mesh
             .ends(e)
             .into_iter()
@@ -255,14 +256,14 @@ impl Bench<'_, '_> {
         let mut wishes: SmallVec<[DVec3; 6]> =
             [t, 0.0, 0.25, 0.5, 0.75, 1.0].into_iter().map(|t| a + t * (b - a)).collect();
         self.sort(&merge, &mut wishes);
-        self.place(&merge, &wishes, normal, fits.then_some([Kind::Cylinder, Kind::Sphere]), rules)
+        self.place(&merge, &wishes, normal, fits.then_some([Kind::Cylinder, Kind::Sphere]))
     }
 
     /// Merges the ends of an edge whatever case they are.
-    pub(super) fn merge_any(&mut self, e: EdgeId, rules: &CollapseRules) -> bool {
-        let fits = self.on_surface(self.editor.mesh().ends(e));
+    pub(super) fn merge_any(&mut self, e: EdgeId, rules: &StarRules) -> bool {
+        let fits = self.on_surface(self.guarded.mesh().ends(e));
         let Some(v) = self.merge_edge(e, rules, fits) else { return false };
-        let ring: SmallVec<[VertexId; 16]> = self.editor.mesh().neighbours(v).collect();
+        let ring: SmallVec<[VertexId; 16]> = self.guarded.mesh().neighbours(v).collect();
         self.update(v);
         for w in ring {
             self.update(w);
@@ -271,15 +272,15 @@ impl Bench<'_, '_> {
     }
 
     /// Merges the ends of an edge where one of them is.
-    fn merge_onto(&mut self, e: EdgeId, stay: VertexId, rules: &CollapseRules) -> Option<VertexId> {
-        let merge = self.editor.plan_edge(e, rules)?;
-        let at = self.editor.mesh().point(stay);
-        if merge.placement.nearest(at) != at || self.editor.rim().count() > MOST_VALENCE {
+    fn merge_onto(&mut self, e: EdgeId, stay: VertexId, rules: &StarRules) -> Option<VertexId> {
+        let merge = self.guarded.plan_edge(e, rules).ok()?;
+        let at = self.guarded.mesh().point(stay);
+        if merge.placement.nearest(at) != at || self.guarded.rim().count() > MOST_VALENCE {
             return None;
         }
         let (fit, moved) = (self.surfaces.number(stay), self.surfaces.was_moved(stay));
         let origins = self.surfaces.origins(&merge.ends);
-        let v = self.editor.try_merge(&merge, at, rules)?;
+        let v = self.guarded.merge(&merge, at).ok()?;
         self.keep_fit(v, at, fit, moved);
         self.surfaces.come_from(v, at, origins);
         Some(v)
@@ -293,7 +294,7 @@ impl Bench<'_, '_> {
             return;
         }
         let mut rated: SmallVec<[(f64, DVec3); 6]> =
-            wishes.iter().map(|&p| merge.placement.nearest(p)).map(|p| (self.editor.stretch_at(p), p)).collect();
+            wishes.iter().map(|&p| merge.placement.nearest(p)).map(|p| (self.guarded.stretch_at(p), p)).collect();
         // Stable: of equal ones the optimised point stays first.
         rated.sort_by(|a, b| b.0.total_cmp(&a.0));
         wishes.clear();
@@ -306,28 +307,21 @@ impl Bench<'_, '_> {
     }
 
     /// Puts the merged vertex where the first wish allows, projected onto a fit where one is asked for and found.
-    fn place(
-        &mut self,
-        merge: &Merge,
-        wishes: &[DVec3],
-        normal: DVec3,
-        kinds: Option<[Kind; 2]>,
-        rules: &CollapseRules,
-    ) -> Option<VertexId> {
+    fn place(&mut self, merge: &Merge, wishes: &[DVec3], normal: DVec3, kinds: Option<[Kind; 2]>) -> Option<VertexId> {
         let first = *wishes.first()?;
-        if self.editor.rim().count() > MOST_VALENCE {
+        if self.guarded.rim().count() > MOST_VALENCE {
             return None;
         }
         // Cheap tests first: a star that no guard will admit needs no fit.
-        if self.editor.stretch_at(first) <= 0.0 {
+        if self.guarded.stretch_at(first) <= 0.0 {
             return None;
         }
         if merge.placement == Placement::Anywhere
-            && let Some(v) = self.place_on_fit(merge, wishes, normal, kinds, rules)
+            && let Some(v) = self.place_on_fit(merge, wishes, normal, kinds)
         {
             return Some(v);
         }
-        self.place_anywhere(merge, wishes, rules)
+        self.place_anywhere(merge, wishes)
     }
 
     /// Puts the merged vertex onto the fit that all it merges come from, or onto that of a trial.
@@ -337,11 +331,10 @@ impl Bench<'_, '_> {
         wishes: &[DVec3],
         normal: DVec3,
         kinds: Option<[Kind; 2]>,
-        rules: &CollapseRules,
     ) -> Option<VertexId> {
-        let known = self.surfaces.common(self.editor.mesh(), &merge.ends);
+        let known = self.surfaces.common(self.guarded.mesh(), &merge.ends);
         for &fit in &known {
-            if let Some(v) = self.place_on(fit, merge, wishes, normal, rules) {
+            if let Some(v) = self.place_on(fit, merge, wishes, normal) {
                 return Some(v);
             }
         }
@@ -349,20 +342,13 @@ impl Bench<'_, '_> {
             return None;
         }
         let quadric = kinds?.into_iter().find_map(|kind| {
-            self.allows(kind).then(|| self.surfaces.trial(self.editor.mesh(), &merge.ends, kind)).flatten()
+            self.allows(kind).then(|| self.surfaces.trial(self.guarded.mesh(), &merge.ends, kind)).flatten()
         })?;
         let fit = self.surfaces.add(quadric);
-        self.place_on(fit, merge, wishes, normal, rules)
+        self.place_on(fit, merge, wishes, normal)
     }
 
-    fn place_on(
-        &mut self,
-        fit: u32,
-        merge: &Merge,
-        wishes: &[DVec3],
-        normal: DVec3,
-        rules: &CollapseRules,
-    ) -> Option<VertexId> {
+    fn place_on(&mut self, fit: u32, merge: &Merge, wishes: &[DVec3], normal: DVec3) -> Option<VertexId> {
         let quadric = self.surfaces.quadric(fit);
         let origins = self.surfaces.origins(&merge.ends);
         for &wish in wishes {
@@ -371,7 +357,7 @@ impl Bench<'_, '_> {
             if self.plane_tolerance.is_some_and(|most| error > most) {
                 continue;
             }
-            if let Some(v) = self.editor.try_merge(merge, p, rules) {
+            if let Ok(v) = self.guarded.merge(merge, p) {
                 self.done.largest_projection = self.done.largest_projection.max(error);
                 self.surfaces.accept(v, fit);
                 self.surfaces.come_from(v, p, origins);
@@ -382,23 +368,23 @@ impl Bench<'_, '_> {
     }
 
     /// Puts the merged vertex where the first wish allows, with what it still stands for.
-    fn place_anywhere(&mut self, merge: &Merge, wishes: &[DVec3], rules: &CollapseRules) -> Option<VertexId> {
+    fn place_anywhere(&mut self, merge: &Merge, wishes: &[DVec3]) -> Option<VertexId> {
         let first = *wishes.first()?;
         let origins = self.surfaces.origins(&merge.ends);
         let kept: SmallVec<[_; 3]> = merge
             .ends
             .iter()
             .map(|&v| {
-                let at = self.editor.mesh().point(v);
+                let at = self.guarded.mesh().point(v);
                 (at, self.surfaces.number(v), self.surfaces.was_moved(v))
             })
             .collect();
         // What the collapsed edge or face allows no more, a place above it may: chords of a round face sink into it.
-        let above = |editor: &Editor<'_>| editor.optimum(merge, first);
+        let above = |guarded: &GuardedMesh<'_>| guarded.optimum(merge, first);
         for at in 0..=wishes.len() {
-            let Some(wish) = wishes.get(at).copied().or_else(|| above(self.editor)) else { break };
-            let Some(v) = self.editor.try_merge(merge, wish, rules) else { continue };
-            let at = self.editor.mesh().point(v);
+            let Some(wish) = wishes.get(at).copied().or_else(|| above(self.guarded)) else { break };
+            let Ok(v) = self.guarded.merge(merge, wish) else { continue };
+            let at = self.guarded.mesh().point(v);
             let stayed = kept.into_iter().find(|kept| kept.0 == at);
             let (_, fit, moved) = stayed.unwrap_or((at, None, true));
             let fit = fit.or_else(|| origins.iter().copied().find(|&fit| self.surfaces.holds(fit, at)));

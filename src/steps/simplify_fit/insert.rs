@@ -11,7 +11,7 @@ use super::cases::Bench;
 use crate::mesh::geometry::{angle, stretch};
 use crate::mesh::halfedge::{edge_of, halfedge_of, twin};
 use crate::mesh::{EdgeId, FaceId, Freedom, HalfedgeId, VertexId};
-use crate::technique::remesh::Gain;
+use crate::technique::guarded::Gain;
 use crate::watch::{Cancelled, Watch};
 
 /// How far from the short side, in lengths of it and as a part of the aspect ratio allowed.
@@ -29,7 +29,7 @@ const MOST_FLIPS: usize = 256;
 /// Flips edges within planes until the smallest angles are as large as they can be: changes no geometry.
 pub(super) fn flip_within_planes(bench: &mut Bench<'_, '_>, watch: &Watch) -> Result<(), Cancelled> {
     watch.phase("flip within planes", None);
-    let mut edges: Vec<EdgeId> = bench.editor.mesh().edges().collect();
+    let mut edges: Vec<EdgeId> = bench.guarded.mesh().edges().collect();
     edges.reverse();
     let mut left = 8 * edges.len();
     while let Some(e) = edges.pop() {
@@ -40,12 +40,12 @@ pub(super) fn flip_within_planes(bench: &mut Bench<'_, '_>, watch: &Watch) -> Re
         if left.is_multiple_of(256) {
             watch.check()?;
         }
-        let mesh = bench.editor.mesh();
+        let mesh = bench.guarded.mesh();
         let h = halfedge_of(e);
         let (Some(f), Some(g)) = (mesh.face(h), mesh.face(twin(h))) else { continue };
         if mesh.edge_freedom(e) == Freedom::Free
-            && bench.editor.is_plane(f, g)
-            && bench.editor.try_flip(e, Gain::LeastAngle)
+            && bench.guarded.is_plane(f, g)
+            && bench.guarded.flip(e, Gain::LeastAngle).is_ok()
         {
             edges.extend(sides_of_pair(bench, e));
         }
@@ -55,14 +55,14 @@ pub(super) fn flip_within_planes(bench: &mut Bench<'_, '_>, watch: &Watch) -> Re
 
 /// The four edges round the two faces of an edge.
 fn sides_of_pair(bench: &Bench<'_, '_>, e: EdgeId) -> [EdgeId; 4] {
-    let mesh = bench.editor.mesh();
+    let mesh = bench.guarded.mesh();
     let h = halfedge_of(e);
     [mesh.next(h), mesh.prev(h), mesh.next(twin(h)), mesh.prev(twin(h))].map(edge_of)
 }
 
 /// Puts a vertex on a side of a face; `false` where none may get one.
 pub(super) fn insert(bench: &mut Bench<'_, '_>, f: FaceId) -> bool {
-    let mesh = bench.editor.mesh();
+    let mesh = bench.guarded.mesh();
     let first = mesh.face_halfedge(f);
     let mut sides = [first, mesh.next(first), mesh.prev(first)].map(|h| (length(bench, h), h));
     sides.sort_by(|a, b| a.0.total_cmp(&b.0).then(edge_of(a.1).cmp(&edge_of(b.1))));
@@ -76,11 +76,11 @@ pub(super) fn insert(bench: &mut Bench<'_, '_>, f: FaceId) -> bool {
     }
     let ends = [mesh.origin(h), mesh.target(h)];
     let reach = FAR * bench.params.max_aspect * short;
-    let is_curve = |h: HalfedgeId| bench.editor.mesh().edge_freedom(edge_of(h)) != Freedom::Free;
+    let is_curve = |h: HalfedgeId| bench.guarded.mesh().edge_freedom(edge_of(h)) != Freedom::Free;
     let mut long_sides = [(is_curve(sides[2].1), sides[2]), (is_curve(sides[1].1), sides[1])];
     long_sides.sort_by_key(|&(is_curve, _)| is_curve);
     long_sides.into_iter().any(|(_, (length, side))| {
-        let mesh = bench.editor.mesh();
+        let mesh = bench.guarded.mesh();
         let share = (reach / length).min(0.5);
         let share = if ends.contains(&mesh.origin(side)) { share } else { 1.0 - share };
         match encroached(bench, side, share) {
@@ -109,10 +109,10 @@ fn place(bench: &mut Bench<'_, '_>, h: HalfedgeId, share: f64) -> bool {
 
 /// The longest side of a poor face whose apex a vertex is, and the foot of the vertex on it.
 fn cap_at(bench: &Bench<'_, '_>, v: VertexId) -> Option<(HalfedgeId, f64)> {
-    let mesh = bench.editor.mesh();
-    let limit = bench.editor.limits().min_stretch;
+    let mesh = bench.guarded.mesh();
+    let limit = bench.guarded.limits().min_stretch;
     let p = mesh.point(v);
-    let poor = mesh.outgoing(v).filter(|&h| mesh.face(h).is_some_and(|f| bench.editor.stretch(f) < limit));
+    let poor = mesh.outgoing(v).filter(|&h| mesh.face(h).is_some_and(|f| bench.guarded.stretch(f) < limit));
     poor.map(|h| mesh.next(h)).find_map(|side| {
         let [x, y] = [mesh.origin(side), mesh.target(side)].map(|v| mesh.point(v));
         let foot = (p - x).dot(y - x) / (y - x).length_squared();
@@ -123,7 +123,7 @@ fn cap_at(bench: &Bench<'_, '_>, v: VertexId) -> Option<(HalfedgeId, f64)> {
 /// The part of a curve that a vertex on an edge would make a poor face with, and the foot of the vertex on it: that
 /// part gets the vertex instead. Looked for among the faces that flips would give to the vertex.
 fn encroached(bench: &Bench<'_, '_>, h: HalfedgeId, share: f64) -> Option<(HalfedgeId, f64)> {
-    let mesh = bench.editor.mesh();
+    let mesh = bench.guarded.mesh();
     let p = mesh.point(mesh.origin(h)).lerp(mesh.point(mesh.target(h)), share);
     let mut sides: SmallVec<[HalfedgeId; 32]> = SmallVec::new();
     for side in [h, twin(h)].into_iter().filter(|&side| mesh.face(side).is_some()) {
@@ -146,7 +146,8 @@ fn encroached(bench: &Bench<'_, '_>, h: HalfedgeId, share: f64) -> Option<(Halfe
         }
         let shape = stretch([p, x, y]);
         let is_over = (x - p).dot(y - p) < 0.0;
-        if is_over && shape < 2.0 * bench.editor.limits().min_stretch && worst.is_none_or(|(least, ..)| shape < least) {
+        if is_over && shape < 2.0 * bench.guarded.limits().min_stretch && worst.is_none_or(|(least, ..)| shape < least)
+        {
             let foot = (p - x).dot(y - x) / (y - x).length_squared();
             worst = Some((shape, side, foot.clamp(0.1, 0.9)));
         }
@@ -155,22 +156,22 @@ fn encroached(bench: &Bench<'_, '_>, h: HalfedgeId, share: f64) -> Option<(Halfe
 }
 
 fn length(bench: &Bench<'_, '_>, h: HalfedgeId) -> f64 {
-    let mesh = bench.editor.mesh();
+    let mesh = bench.guarded.mesh();
     mesh.point(mesh.origin(h)).distance(mesh.point(mesh.target(h)))
 }
 
 /// Splits an edge, and flips round the new vertex.
 fn split(bench: &mut Bench<'_, '_>, h: HalfedgeId, share: f64) -> Option<VertexId> {
-    let mesh = bench.editor.mesh();
+    let mesh = bench.guarded.mesh();
     let ends = [mesh.origin(h), mesh.target(h)];
     let at = mesh.point(ends[0]).lerp(mesh.point(ends[1]), share);
     let origins = bench.surfaces.origins(&ends);
     // The halves are needles still, until flips make better faces of them.
-    let limit = bench.editor.set_min_stretch(0.0);
-    let made = bench.editor.try_split(edge_of(h), at);
-    bench.editor.set_min_stretch(limit);
-    let v = made?;
-    let at = bench.editor.mesh().point(v);
+    let limit = bench.guarded.set_min_stretch(0.0);
+    let made = bench.guarded.split(edge_of(h), at);
+    bench.guarded.set_min_stretch(limit);
+    let v = made.ok()?;
+    let at = bench.guarded.mesh().point(v);
     bench.surfaces.carry(v, None, true);
     bench.surfaces.come_from(v, at, origins);
     bench.update(v);
@@ -180,7 +181,7 @@ fn split(bench: &mut Bench<'_, '_>, h: HalfedgeId, share: f64) -> Option<VertexI
 
 /// Flips the edges round a vertex, and what comes after them, while the smallest angles rise.
 fn flip_round(bench: &mut Bench<'_, '_>, v: VertexId) {
-    let mesh = bench.editor.mesh();
+    let mesh = bench.guarded.mesh();
     let mut edges: Vec<EdgeId> = Vec::new();
     for h in mesh.outgoing(v) {
         edges.push(edge_of(h));
@@ -190,11 +191,11 @@ fn flip_round(bench: &mut Bench<'_, '_>, v: VertexId) {
     }
     let mut flips = 0;
     while let Some(e) = edges.pop() {
-        let mesh = bench.editor.mesh();
+        let mesh = bench.guarded.mesh();
         if !mesh.edge_is_live(e) || mesh.edge_freedom(e) != Freedom::Free || mesh.is_boundary_edge(e) {
             continue;
         }
-        if bench.editor.try_flip(e, Gain::LeastAngle) {
+        if bench.guarded.flip(e, Gain::LeastAngle).is_ok() {
             flips += 1;
             if flips == MOST_FLIPS {
                 return;

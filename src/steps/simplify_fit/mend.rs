@@ -13,10 +13,9 @@ use crate::mesh::geometry::angle;
 use crate::mesh::halfedge::{HalfedgeMesh, edge_of};
 use crate::mesh::{EdgeId, FaceId, Freedom, HalfedgeId, VertexId};
 use crate::metric::shape::best_stretch_with_angle;
-use crate::technique::collapse::{CollapseRules, Editor, Order, Priority};
-use crate::technique::remesh::{
-    Gain, Refusals, faces_below, flip_edges, raise_stretch, relax_vertices, towards_centroid,
-};
+use crate::technique::collapse::{CollapseRules, Order, Priority, collapse_edge};
+use crate::technique::guarded::{Gain, GuardedMesh, StarRules};
+use crate::technique::remesh::{Refusals, faces_below, flip_edges, raise_stretch, relax_vertices, towards_centroid};
 use crate::watch::{Cancelled, Watch};
 
 /// Edits at one face in one round.
@@ -37,8 +36,8 @@ const MOST_ROUNDS: usize = 16;
 /// Mends the faces below a stretch, worst first. Returns how many are left.
 pub(super) fn mend(bench: &mut Bench<'_, '_>, limit: f64, watch: &Watch) -> Result<usize, Cancelled> {
     let rules = rules(limit);
-    let mut left = faces_below(bench.editor, limit);
-    let most = MOST_GROWTH * bench.editor.mesh().face_count();
+    let mut left = faces_below(bench.guarded, limit);
+    let most = MOST_GROWTH * bench.guarded.mesh().face_count();
     let mut tried: Vec<u64> = Vec::new();
     let (mut fewest, mut vain) = (left.len(), 0);
     for _ in 0..MOST_ROUNDS {
@@ -49,7 +48,7 @@ pub(super) fn mend(bench: &mut Bench<'_, '_>, limit: f64, watch: &Watch) -> Resu
         for (place, &f) in left.iter().enumerate() {
             if place.is_multiple_of(64) {
                 watch.check()?;
-                watch.advance(place as u64, || format!("{} faces", bench.editor.mesh().face_count()));
+                watch.advance(place as u64, || format!("{} faces", bench.guarded.mesh().face_count()));
             }
             if !is_bad(bench, f, limit) || tried.get(f.index()) == Some(&age(bench, f)) {
                 continue;
@@ -60,10 +59,10 @@ pub(super) fn mend(bench: &mut Bench<'_, '_>, limit: f64, watch: &Watch) -> Resu
                 tried[f.index()] = age(bench, f);
             }
         }
-        left = faces_below(bench.editor, limit);
+        left = faces_below(bench.guarded, limit);
         vain = if left.len() < fewest { 0 } else { vain + 1 };
         fewest = fewest.min(left.len());
-        if vain == MOST_VAIN || bench.editor.mesh().face_count() > most {
+        if vain == MOST_VAIN || bench.guarded.mesh().face_count() > most {
             break;
         }
     }
@@ -72,15 +71,13 @@ pub(super) fn mend(bench: &mut Bench<'_, '_>, limit: f64, watch: &Watch) -> Resu
 
 /// Changes when the surroundings of a face change.
 fn age(bench: &Bench<'_, '_>, f: FaceId) -> u64 {
-    let mesh = bench.editor.mesh();
+    let mesh = bench.guarded.mesh();
     mesh.corners(f).into_iter().flat_map(|v| mesh.neighbours(v)).map(|v| u64::from(mesh.version(v))).sum()
 }
 
 fn rules(limit: f64) -> CollapseRules {
     CollapseRules {
-        min_stretch: limit,
-        mean_stretch: 0.0,
-        mend_below: Some(limit),
+        star: StarRules { min_stretch: limit, mean_stretch: 0.0, mend_below: Some(limit) },
         order: Order::OnSurface,
         priority: Priority::SmallFirst { size: 1.0 },
     }
@@ -89,13 +86,13 @@ fn rules(limit: f64) -> CollapseRules {
 /// Mends the few faces that are left by the search for sequences of edits; vertices that leave their fit are on none.
 /// Returns how many are left where it was worth a search, else 0.
 pub(super) fn mend_by_search(bench: &mut Bench<'_, '_>, limit: f64, watch: &Watch) -> Result<usize, Cancelled> {
-    let count = faces_below(bench.editor, limit).len();
+    let count = faces_below(bench.guarded, limit).len();
     if count == 0 || count > MOST_SEARCHED {
         return Ok(0);
     }
     let rules = rules(limit);
-    let rest = raise_stretch(bench.editor, limit, &rules, watch)?;
-    let mesh = bench.editor.mesh();
+    let rest = raise_stretch(bench.guarded, limit, &rules, watch)?;
+    let mesh = bench.guarded.mesh();
     let left: Vec<VertexId> = mesh
         .vertices()
         .filter(|&v| bench.surfaces.number(v).is_some_and(|fit| !bench.surfaces.holds(fit, mesh.point(v))))
@@ -107,7 +104,7 @@ pub(super) fn mend_by_search(bench: &mut Bench<'_, '_>, limit: f64, watch: &Watc
 }
 
 fn is_bad(bench: &Bench<'_, '_>, f: FaceId, limit: f64) -> bool {
-    bench.editor.mesh().face_is_live(f) && bench.editor.stretch(f) < limit
+    bench.guarded.mesh().face_is_live(f) && bench.guarded.stretch(f) < limit
 }
 
 /// Collapses and flips that bring the face nearer to the limit, and new vertices where there is none.
@@ -117,11 +114,11 @@ fn mend_face(bench: &mut Bench<'_, '_>, f: FaceId, limit: f64, rules: &CollapseR
             return;
         }
         let sides = sides(bench, f);
-        if let Some(v) = sides[..2].iter().find_map(|&e| bench.editor.try_collapse(e, rules)) {
+        if let Some(v) = sides[..2].iter().find_map(|&e| collapse_edge(bench.guarded, e, rules)) {
             bench.settle_fit(v);
             continue;
         }
-        if sides.iter().rev().any(|&e| bench.editor.try_flip(e, Gain::Mend(limit))) {
+        if sides.iter().rev().any(|&e| bench.guarded.flip(e, Gain::Mend(limit)).is_ok()) {
             continue;
         }
         if !bench.may_insert || is_wedge(bench, f, limit) || !insert(bench, f) {
@@ -132,7 +129,7 @@ fn mend_face(bench: &mut Bench<'_, '_>, f: FaceId, limit: f64, rules: &CollapseR
 
 /// Whether two curves meet in a corner of the face at an angle that no triangle above the limit has.
 fn is_wedge(bench: &Bench<'_, '_>, f: FaceId, limit: f64) -> bool {
-    let mesh = bench.editor.mesh();
+    let mesh = bench.guarded.mesh();
     let h = mesh.face_halfedge(f);
     [h, mesh.next(h), mesh.prev(h)].into_iter().any(|out| {
         let back = mesh.prev(out);
@@ -145,7 +142,7 @@ fn is_wedge(bench: &Bench<'_, '_>, f: FaceId, limit: f64) -> bool {
 
 /// The sides of a face, shortest first.
 fn sides(bench: &Bench<'_, '_>, f: FaceId) -> [EdgeId; 3] {
-    let mesh = bench.editor.mesh();
+    let mesh = bench.guarded.mesh();
     let h = mesh.face_halfedge(f);
     let mut sides = [h, mesh.next(h), mesh.prev(h)].map(|h| (length_squared(bench, h), edge_of(h)));
     sides.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
@@ -153,7 +150,7 @@ fn sides(bench: &Bench<'_, '_>, f: FaceId) -> [EdgeId; 3] {
 }
 
 fn length_squared(bench: &Bench<'_, '_>, h: HalfedgeId) -> f64 {
-    let mesh = bench.editor.mesh();
+    let mesh = bench.guarded.mesh();
     mesh.point(mesh.origin(h)).distance_squared(mesh.point(mesh.target(h)))
 }
 
@@ -166,12 +163,12 @@ pub(super) fn polish(
     watch: &Watch,
 ) -> Result<(), Cancelled> {
     watch.phase("polish", Some(rounds as u64));
-    let Bench { editor, surfaces, .. } = bench;
+    let Bench { guarded, surfaces, .. } = bench;
     for round in 0..rounds {
-        watch.advance(round as u64, || format!("{} faces", editor.mesh().face_count()));
-        let flips = flip_edges(editor, refusals, watch)?;
-        let moves = relax_vertices(editor, refusals, watch, |editor, v| relax(editor, surfaces, v))?;
-        if (flips + moves) * 100 < editor.mesh().vertex_count() {
+        watch.advance(round as u64, || format!("{} faces", guarded.mesh().face_count()));
+        let flips = flip_edges(guarded, refusals, watch)?;
+        let moves = relax_vertices(guarded, refusals, watch, |guarded, v| relax(guarded, surfaces, v))?;
+        if (flips + moves) * 100 < guarded.mesh().vertex_count() {
             break;
         }
     }
@@ -185,12 +182,12 @@ const WORTH_A_MOVE: f64 = 0.85;
 const WORTH_A_STEP: f64 = 0.07;
 
 /// Towards the area-weighted centre of the star.
-fn relax(editor: &mut Editor<'_>, surfaces: &Surfaces, v: VertexId) -> bool {
-    let mesh = editor.mesh();
+fn relax(guarded: &mut GuardedMesh<'_>, surfaces: &Surfaces, v: VertexId) -> bool {
+    let mesh = guarded.mesh();
     if mesh.vertex_freedom(v) != Freedom::Free || mesh.is_boundary_vertex(v) {
         return false;
     }
-    if mesh.faces_around(v).all(|f| editor.stretch(f) >= WORTH_A_MOVE) {
+    if mesh.faces_around(v).all(|f| guarded.stretch(f) >= WORTH_A_MOVE) {
         return false;
     }
     let at = mesh.point(v);
@@ -206,9 +203,9 @@ fn relax(editor: &mut Editor<'_>, surfaces: &Surfaces, v: VertexId) -> bool {
         let to = match fit {
             Some(fit) => fit.project(wish),
             None if is_flat => Some(wish),
-            None => editor.project(wish),
+            None => guarded.project(wish),
         };
-        to.is_some_and(|to| editor.try_move(v, to, Gain::Quality))
+        to.is_some_and(|to| guarded.relocate(v, to, Gain::Quality).is_ok())
     })
 }
 

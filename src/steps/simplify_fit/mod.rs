@@ -53,10 +53,9 @@ use crate::mesh::{FreedomError, LockRules, Surface, VertexId, resolve_freedom};
 use crate::step::{
     Angle, Artifact, InputDef, Inputs, Length, Locks, OutPort, OutputDef, Port, Produced, Share, StepFailure,
 };
-use crate::technique::collapse::session::{Setup, ToleranceMode, diagonal, open, reference_tree};
-use crate::technique::collapse::{Editor, Limits, SizeField};
 use crate::technique::dispersion::Dispersion;
 use crate::technique::fit::regions::{Wanted, fit_regions};
+use crate::technique::guarded::{GuardedMesh, Limits, Setup, SizeField, ToleranceMode, diagonal, open, reference_tree};
 use crate::technique::remesh::Refusals;
 use crate::watch::{Cancelled, Watch};
 
@@ -271,16 +270,16 @@ fn simplified(
     let reference = if shares { &surface } else { other.as_ref().unwrap_or(input.reference) };
     let freedom = resolve_freedom(&surface, &input.locks)?;
     let tree = reference_tree(plan.setup.mode, reference);
-    let mut editor = open(&surface, &freedom, reference, &tree, plan.setup.clone())?;
-    let mut fits = Surfaces::new(editor.mesh().vertex_slots(), plan.tolerance);
-    let done = run(&mut editor, &mut fits, params, plan, watch)?;
-    let counts = editor.counts();
-    let is_short = editor.mesh().face_count() > plan.target;
-    let barred = is_short.then(|| report::bars(&mut editor, plan.setup.limits.min_stretch));
-    let distance_bound = editor.distance_bound(plan.tolerance);
-    let slots: Vec<VertexId> = editor.mesh().vertices().collect();
-    let on_fits: Vec<_> = slots.iter().map(|&v| report::on_fit(&fits, editor.mesh().point(v), v)).collect();
-    let mut result = editor.into_mesh().leave().surface;
+    let mut guarded = open(&surface, &freedom, reference, &tree, plan.setup.clone())?;
+    let mut fits = Surfaces::new(guarded.mesh().vertex_slots(), plan.tolerance);
+    let done = run(&mut guarded, &mut fits, params, plan, watch)?;
+    let counts = guarded.counts();
+    let is_short = guarded.mesh().face_count() > plan.target;
+    let barred = is_short.then(|| report::bars(&mut guarded, plan.setup.limits.min_stretch));
+    let distance_bound = guarded.distance_bound(plan.tolerance);
+    let slots: Vec<VertexId> = guarded.mesh().vertices().collect();
+    let on_fits: Vec<_> = slots.iter().map(|&v| report::on_fit(&fits, guarded.mesh().point(v), v)).collect();
+    let mut result = guarded.into_mesh().leave().surface;
     let freedom = resolve_freedom(&result, &input.locks)?;
     let least = least_stretch_of(params.max_aspect);
     let mut stats = report::quality(&result, &freedom, params.max_aspect, least);
@@ -310,7 +309,7 @@ fn simplified(
 
 /// The loop of the paper, then mending and the loop again until the target holds on good faces.
 fn run(
-    editor: &mut Editor<'_>,
+    guarded: &mut GuardedMesh<'_>,
     fits: &mut Surfaces,
     params: &SimplifyFitParams,
     plan: &Plan,
@@ -319,8 +318,8 @@ fn run(
     let limit = plan.setup.limits.min_stretch;
     let is_plane = params.tolerance_mode == FitTolerance::Plane;
     let mut bench = Bench {
-        dispersion: vec![0.0; editor.mesh().vertex_slots()],
-        editor,
+        dispersion: vec![0.0; guarded.mesh().vertex_slots()],
+        guarded,
         params,
         surfaces: fits,
         done: Done::default(),
@@ -329,8 +328,8 @@ fn run(
         plane_tolerance: is_plane.then_some(plan.tolerance),
     };
     insert::flip_within_planes(&mut bench, watch)?;
-    let regions = fit_regions(bench.editor.mesh(), params.wanted_regions(plan.tolerance), watch)?;
-    bench.surfaces.know(bench.editor.mesh(), &regions);
+    let regions = fit_regions(bench.guarded.mesh(), params.wanted_regions(plan.tolerance), watch)?;
+    bench.surfaces.know(bench.guarded.mesh(), &regions);
     bench.done.fillets = report::fillets(&regions);
     bench.update_all();
     let mut reached = queue::simplify(&mut bench, plan.target, watch)?;
@@ -353,10 +352,10 @@ fn end(bench: &mut Bench<'_, '_>, mut reached: bool, plan: &Plan, watch: &Watch)
     let limit = plan.setup.limits.min_stretch;
     let mut refusals = Refusals::default();
     for _ in 0..MOST_ENDINGS {
-        let before = bench.editor.mesh().face_count();
+        let before = bench.guarded.mesh().face_count();
         reached = reached || queue::exhaust(bench, plan.target, watch)?;
         mend::polish(bench, POLISH_ROUNDS, &mut refusals, watch)?;
-        if reached || bench.editor.mesh().face_count() == before {
+        if reached || bench.guarded.mesh().face_count() == before {
             break;
         }
     }

@@ -10,9 +10,9 @@ use super::cases::{Done, MOST_VALENCE};
 use super::surfaces::Surfaces;
 use crate::mesh::geometry::{aspect_ratio, centroid, stretch};
 use crate::mesh::{EdgeId, Field, ResolvedFreedom, Support, Surface, VertexId};
-use crate::technique::collapse::session::{Cause, cause};
-use crate::technique::collapse::{Bars, CollapseRules, Counts, Editor, Order, Priority};
+use crate::technique::collapse::{Bars, bar_of};
 use crate::technique::fit::{FitRegion, Quadric};
+use crate::technique::guarded::{Cause, Counts, GuardedMesh, StarRules, cause};
 
 /// How it ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
@@ -264,18 +264,12 @@ pub(super) fn operations(done: &Done, counts: Counts) -> Operations {
 }
 
 /// What bars the edges that are left.
-pub(super) fn bars(editor: &mut Editor<'_>, min_stretch: f64) -> Bars {
-    let rules = CollapseRules {
-        min_stretch,
-        mean_stretch: 0.0,
-        mend_below: None,
-        order: Order::OnSurface,
-        priority: Priority::SmallFirst { size: 1.0 },
-    };
-    let edges: Vec<EdgeId> = editor.mesh().edges().collect();
+pub(super) fn bars(guarded: &mut GuardedMesh<'_>, min_stretch: f64) -> Bars {
+    let rules = StarRules { min_stretch, ..StarRules::default() };
+    let edges: Vec<EdgeId> = guarded.mesh().edges().collect();
     let mut bars = Bars::default();
     for e in edges {
-        bars.add(editor.bar_of(e, &rules, MOST_VALENCE));
+        bars.add(bar_of(guarded, e, &rules, MOST_VALENCE));
     }
     bars
 }

@@ -1,5 +1,5 @@
-//! Edge collapse with exchangeable placement, validity and priority: the simplification behind quality improvement and
-//! property control.
+//! Edge collapse with exchangeable placement and priority on a guarded mesh: the simplification behind quality
+//! improvement and property control.
 //!
 //! The loop of figure 7 of the paper: positions, valid edges, priorities, collapse, until the target is reached or no
 //! edge is valid.
@@ -7,8 +7,7 @@
 //! Based on: H. Date, S. Kanai, T. Kishinami, I. Nishigaki, T. Dohi. High-Quality and Property Controlled Finite
 //! Element Mesh Generation From Triangular Meshes using the Multiresolution Technique. JCISE 5(4), 2005, section 5.
 //!
-//! Invariants: every accepted collapse keeps thresholds ([`limits`]), tolerance ([`keeper`]), topology and freedom
-//! ([`crate::mesh::edit`]) and makes no new self-intersection ([`collision`]). Equal input gives equal output: ties go
+//! Invariants: those of [`GuardedMesh`], whose verbs do all that is done here. Equal input gives equal output: ties go
 //! to the lowest edge number.
 //!
 //! Departure: edges are rated when they come to the top of the queue, not whenever their star changes (`queue`); until
@@ -16,36 +15,19 @@
 //! the time, and the mean stretch of the result is higher.
 //! Cost: O(F log F), about two ratings a collapse.
 
+mod attempt;
 mod bars;
-mod boxes;
-mod clip;
-pub mod collision;
-mod corners;
-mod cover;
-mod drift;
-pub mod editor;
-pub mod envelope;
-pub mod keeper;
-pub mod limits;
-pub mod merge;
-pub mod placement;
-pub mod priority;
-pub mod quadrics;
+mod placement;
+mod priority;
 mod queue;
-pub mod session;
-pub(in crate::technique) mod star;
-mod target;
 
 use queue::Queue;
 
+use crate::technique::guarded::GuardedMesh;
 use crate::watch::{Cancelled, Watch};
 
-pub use bars::{Bar, Bars};
-pub use editor::{Attempt, CollapseRules, Counts, Editor};
-pub use envelope::Envelope;
-pub use keeper::{Curves, Keeper};
-pub use limits::{Limits, SizeField};
-pub use merge::Merge;
+pub use attempt::{CollapseRules, collapse_edge};
+pub use bars::{Bars, bar_of};
 pub use placement::Order;
 pub use priority::Priority;
 
@@ -77,30 +59,30 @@ const LOOK_AT_MEAN: f64 = 0.005;
 
 /// Collapses valid edges, best first, until the goal is reached or no edge is valid.
 pub fn simplify(
-    editor: &mut Editor<'_>,
+    guarded: &mut GuardedMesh<'_>,
     rules: &CollapseRules,
     goal: Goal,
     watch: &Watch,
 ) -> Result<Ending, Cancelled> {
-    let start = editor.mesh().face_count();
+    let start = guarded.mesh().face_count();
     watch.phase("collapse", Some(start.saturating_sub(goal.faces) as u64));
-    let mut queue = Queue::new(editor, rules, watch)?;
+    let mut queue = Queue::new(guarded, rules, watch)?;
     let mut done = 0_usize;
     let mut look_at = if goal.mean_stretch > 0.0 { start } else { 0 };
-    while editor.mesh().face_count() > goal.faces {
-        if editor.mesh().face_count() <= look_at {
-            if editor.mean_stretch() < goal.mean_stretch {
+    while guarded.mesh().face_count() > goal.faces {
+        if guarded.mesh().face_count() <= look_at {
+            if guarded.mean_stretch() < goal.mean_stretch {
                 return Ok(Ending::Mean);
             }
             look_at = ((1.0 - LOOK_AT_MEAN) * look_at as f64) as usize;
         }
-        if queue.collapse_next(editor, rules).is_none() {
+        if queue.collapse_next(guarded, rules).is_none() {
             return Ok(Ending::Exhausted);
         }
         done += 1;
         if done.is_multiple_of(WATCH_EVERY) {
             watch.check()?;
-            let left = editor.mesh().face_count();
+            let left = guarded.mesh().face_count();
             watch.advance((start - left) as u64, || format!("{left} faces left"));
         }
     }

@@ -12,9 +12,10 @@
 //! Estimates are kept to an eighth of an octave. Edges of the same step leave by number, which is by place: one
 //! collapse finds in the cache what the one before it has read.
 
-use super::editor::{Attempt, CollapseRules, Editor};
+use super::attempt::{Attempt, CollapseRules, collapse_from, estimate, rate};
 use crate::mesh::halfedge::edge_of;
 use crate::mesh::{EdgeId, VertexId};
+use crate::technique::guarded::GuardedMesh;
 use crate::technique::heap::IndexedHeap;
 use crate::watch::{Cancelled, Watch};
 
@@ -34,38 +35,38 @@ pub(super) struct Queue {
 }
 
 impl Queue {
-    pub(super) fn new(editor: &mut Editor<'_>, rules: &CollapseRules, watch: &Watch) -> Result<Self, Cancelled> {
-        let slots = editor.mesh().edge_slots();
+    pub(super) fn new(guarded: &mut GuardedMesh<'_>, rules: &CollapseRules, watch: &Watch) -> Result<Self, Cancelled> {
+        let slots = guarded.mesh().edge_slots();
         let mut this = Self {
             heap: IndexedHeap::with_items(slots),
             refused: vec![false; slots],
             edges: Vec::new(),
             now: f32::INFINITY,
-            is_exact: editor.is_recording(),
+            is_exact: guarded.is_recording(),
         };
         for edge in (0..slots).map(EdgeId::new) {
             if edge.index().is_multiple_of(4096) {
                 watch.check()?;
             }
-            if editor.mesh().edge_is_live(edge) {
-                this.enter(editor, rules, edge);
+            if guarded.mesh().edge_is_live(edge) {
+                this.enter(guarded, rules, edge);
             }
         }
         Ok(this)
     }
 
     /// Collapses the best edge. `None` when no edge is valid.
-    pub(super) fn collapse_next(&mut self, editor: &mut Editor<'_>, rules: &CollapseRules) -> Option<VertexId> {
+    pub(super) fn collapse_next(&mut self, guarded: &mut GuardedMesh<'_>, rules: &CollapseRules) -> Option<VertexId> {
         while let Some((item, index)) = self.heap.pop() {
             let edge = EdgeId::from_raw(item);
-            if !editor.mesh().edge_is_live(edge) {
+            if !guarded.mesh().edge_is_live(edge) {
                 continue;
             }
             self.now = index;
             let next = self.heap.peek().map_or(f32::NEG_INFINITY, |(_, next)| next);
-            match editor.collapse_from(edge, rules, next) {
+            match collapse_from(guarded, edge, rules, next) {
                 Attempt::Collapsed(merged) => {
-                    self.follow(editor, rules, merged);
+                    self.follow(guarded, rules, merged);
                     return Some(merged);
                 }
                 Attempt::Postponed(index) => self.heap.set(item, self.step(index)),
@@ -81,9 +82,9 @@ impl Queue {
     }
 
     /// Lets an edge wait with an estimate, or where there is none with its index.
-    fn enter(&mut self, editor: &mut Editor<'_>, rules: &CollapseRules, edge: EdgeId) {
-        let estimate = if self.is_exact { None } else { editor.estimate_collapse(edge, rules) };
-        let index = estimate.or_else(|| editor.rate_collapse(edge, rules));
+    fn enter(&mut self, guarded: &mut GuardedMesh<'_>, rules: &CollapseRules, edge: EdgeId) {
+        let estimated = if self.is_exact { None } else { estimate(guarded, edge, rules) };
+        let index = estimated.or_else(|| rate(guarded, edge, rules));
         self.refused[edge.index()] = index.is_none();
         match index {
             Some(index) => self.heap.set(edge.raw(), self.step(index)),
@@ -92,8 +93,8 @@ impl Queue {
     }
 
     /// Tells of the collapse into `merged`, which has changed the stars of the edges round it.
-    fn follow(&mut self, editor: &mut Editor<'_>, rules: &CollapseRules, merged: VertexId) {
-        let mesh = editor.mesh();
+    fn follow(&mut self, guarded: &mut GuardedMesh<'_>, rules: &CollapseRules, merged: VertexId) {
+        let mesh = guarded.mesh();
         self.edges.clear();
         for spoke in mesh.outgoing(merged) {
             self.edges.push(edge_of(spoke));
@@ -111,7 +112,7 @@ impl Queue {
         }
         let edges = std::mem::take(&mut self.edges);
         for &edge in &edges {
-            self.enter(editor, rules, edge);
+            self.enter(guarded, rules, edge);
         }
         // Its room is used again.
         self.edges = edges;

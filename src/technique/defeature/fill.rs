@@ -8,8 +8,8 @@ use crate::mesh::bvh::{Primitive, TriangleBvh};
 use crate::mesh::geometry::{Aabb, area_vector};
 use crate::mesh::predicate::triangle_triangle;
 use crate::mesh::{Carried, EdgeKey, FaceId, IdVec, LockRules, Rim, Surface, VertexId, edge_key, resolve_freedom};
-use crate::technique::collapse::session::{Setup, ToleranceMode, open};
-use crate::technique::collapse::{CollapseRules, Goal, Limits, Order, Priority, SizeField};
+use crate::technique::collapse::{CollapseRules, Goal, Order, Priority};
+use crate::technique::guarded::{Limits, Setup, SizeField, StarRules, ToleranceMode, open};
 use crate::technique::refine::{Flips, MaxEdge, refine};
 use crate::technique::remesh::coarsen;
 use crate::technique::triangulate_loop::Loop;
@@ -109,16 +109,14 @@ impl Fill {
             limits: Limits { min_stretch: 0.2, max_size: SizeField::Uniform(LONGEST * size), max_valence: 12 },
             may_merge_corners: false,
         };
-        let Ok(mut editor) = open(&fine, &freedom, &membrane, &tree, setup) else { return Ok(None) };
+        let Ok(mut guarded) = open(&fine, &freedom, &membrane, &tree, setup) else { return Ok(None) };
         let rules = CollapseRules {
-            min_stretch: 0.2,
-            mean_stretch: 0.0,
-            mend_below: None,
+            star: StarRules { min_stretch: 0.2, ..StarRules::default() },
             order: Order::OnSurface,
             priority: Priority::QualityGain,
         };
-        coarsen(&mut editor, &rules, Goal::default(), &Watch::silent())?;
-        let left = editor.into_mesh().leave();
+        coarsen(&mut guarded, &rules, Goal::default(), &Watch::silent())?;
+        let left = guarded.into_mesh().leave();
         Ok(self.stitched(&left))
     }
 

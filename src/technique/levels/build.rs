@@ -7,9 +7,9 @@ use crate::mesh::bvh::TriangleBvh;
 use crate::mesh::halfedge::EnterError;
 use crate::mesh::transfer::inherit_fields;
 use crate::mesh::{FreedomError, Hierarchy, LockRules, Surface, resolve_freedom};
-use crate::technique::collapse::session::{Setup, open};
-use crate::technique::collapse::{CollapseRules, Counts, Goal, simplify};
+use crate::technique::collapse::{CollapseRules, Goal, simplify};
 use crate::technique::curvature::{Principal, mean_edge, principal_curvatures};
+use crate::technique::guarded::{Counts, Setup, open};
 use crate::technique::hierarchy::Recorder;
 use crate::technique::remesh::{coarsen_purely, optimise, raise_stretch};
 use crate::watch::{Cancelled, Watch};
@@ -27,7 +27,7 @@ pub struct Source<'a> {
     pub surface: &'a Surface,
     /// What the tolerance is measured against.
     pub reference: &'a Surface,
-    /// The boxes over the reference, see [`crate::technique::collapse::session::reference_tree`].
+    /// The boxes over the reference, see [`crate::technique::guarded::reference_tree`].
     pub tree: &'a TriangleBvh,
     /// What must stay.
     pub locks: LockRules<'a>,
@@ -40,7 +40,7 @@ pub struct Recorded {
     pub hierarchy: Hierarchy,
     /// Edits before the record and in it.
     pub counts: Counts,
-    /// The certified distance of the coarsest front, see [`crate::technique::collapse::Editor::distance_bound`].
+    /// The certified distance of the coarsest front, see [`crate::technique::guarded::GuardedMesh::distance_bound`].
     pub distance_bound: Option<f64>,
 }
 
@@ -62,28 +62,28 @@ where
 {
     let Source { surface, reference, tree, locks } = source;
     let freedom = resolve_freedom(surface, &locks)?;
-    let mut editor = open(surface, &freedom, reference, tree, setup.clone())?;
-    raise_stretch(&mut editor, rules.min_stretch, rules, watch)?;
+    let mut guarded = open(surface, &freedom, reference, tree, setup.clone())?;
+    raise_stretch(&mut guarded, rules.star.min_stretch, rules, watch)?;
     if optimise_first {
-        optimise(&mut editor, ROUNDS, watch)?;
-        raise_stretch(&mut editor, rules.min_stretch, rules, watch)?;
+        optimise(&mut guarded, ROUNDS, watch)?;
+        raise_stretch(&mut guarded, rules.star.min_stretch, rules, watch)?;
     }
-    let before = editor.counts();
-    let mut finest = editor.into_mesh().leave().surface;
+    let before = guarded.counts();
+    let mut finest = guarded.into_mesh().leave().surface;
     inherit_fields(surface, &mut finest);
     watch.phase("curvature", None);
     let curvature = principal_curvatures(&finest, CURVATURE_RADIUS * mean_edge(&finest), watch)?;
     let curvature = curvature.iter().map(Principal::largest).collect();
 
     let freedom = resolve_freedom(&finest, &locks)?;
-    let mut editor = open(&finest, &freedom, reference, tree, setup.clone())?;
-    editor.record(Recorder::new(finest.clone(), curvature));
+    let mut guarded = open(&finest, &freedom, reference, tree, setup.clone())?;
+    guarded.record(Recorder::new(finest.clone(), curvature));
     if optimise_first {
-        coarsen_purely(&mut editor, rules, watch)?;
+        coarsen_purely(&mut guarded, rules, watch)?;
     } else {
-        simplify(&mut editor, rules, Goal::default(), watch)?;
+        simplify(&mut guarded, rules, Goal::default(), watch)?;
     }
-    let hierarchy = editor.take_recorder().map(Recorder::finish).unwrap_or_default();
-    let distance_bound = editor.distance_bound(setup.tolerance);
-    Ok(Recorded { hierarchy, counts: before + editor.counts(), distance_bound })
+    let hierarchy = guarded.take_recorder().map(Recorder::finish).unwrap_or_default();
+    let distance_bound = guarded.distance_bound(setup.tolerance);
+    Ok(Recorded { hierarchy, counts: before + guarded.counts(), distance_bound })
 }

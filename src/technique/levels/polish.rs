@@ -10,8 +10,7 @@ use serde::Serialize;
 use super::report::Shape;
 use crate::mesh::bvh::TriangleBvh;
 use crate::mesh::{LockRules, Surface, resolve_freedom};
-use crate::technique::collapse::session::{Setup, ToleranceMode, open};
-use crate::technique::collapse::{Limits, SizeField};
+use crate::technique::guarded::{Limits, Setup, SizeField, ToleranceMode, open};
 use crate::technique::remesh::optimise;
 use crate::watch::{Cancelled, Watch};
 
@@ -37,7 +36,7 @@ pub struct PolishReport {
 
 /// Polishes `mesh`, a front of the hierarchy of `finest` with the shape `before`, within `reach` of `finest`.
 ///
-/// A front on the finest mesh (`reach` 0) and a mesh that the editor cannot take are left as they are.
+/// A front on the finest mesh (`reach` 0) and a mesh that the guarded cannot take are left as they are.
 pub(super) fn polish(
     mesh: &Surface,
     finest: &Surface,
@@ -59,14 +58,14 @@ pub(super) fn polish(
         may_merge_corners: false,
     };
     let tree = TriangleBvh::of_surface(finest);
-    let Ok(mut editor) = open(mesh, &freedom, finest, &tree, setup) else { return Ok(None) };
-    optimise(&mut editor, ROUNDS, watch)?;
-    let counts = editor.counts();
+    let Ok(mut guarded) = open(mesh, &freedom, finest, &tree, setup) else { return Ok(None) };
+    optimise(&mut guarded, ROUNDS, watch)?;
+    let counts = guarded.counts();
     let report = PolishReport {
         flips: counts.flips,
         moves: counts.moves,
         min_stretch_before: before.min_stretch,
         mean_stretch_before: before.mean_stretch,
     };
-    Ok(Some((editor.into_mesh().leave().surface, report)))
+    Ok(Some((guarded.into_mesh().leave().surface, report)))
 }

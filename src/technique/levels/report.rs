@@ -12,8 +12,7 @@ use crate::mesh::topology::EdgeTable;
 use crate::mesh::transfer::inherit_fields;
 use crate::mesh::{EdgeKey, Hierarchy, ResolvedFreedom, Surface, VertexId, edge_key};
 use crate::metric::distance::{Target, two_sided};
-use crate::technique::collapse::session::{Recount, recount};
-use crate::technique::collapse::{Limits, SizeField};
+use crate::technique::guarded::{Limits, Recount, SizeField, recount};
 use crate::technique::hierarchy::{Front, extract};
 use crate::watch::{Cancelled, Watch};
 

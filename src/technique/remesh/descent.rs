@@ -1,8 +1,9 @@
 //! How far and how carefully to coarsen: the stretch that new faces need falls step by step.
 
 use super::passes::Refusals;
-use super::{ROUNDS, optimise_with};
-use crate::technique::collapse::{CollapseRules, Editor, Ending, Goal, simplify};
+use super::{ROUNDS, careful, optimise_with};
+use crate::technique::collapse::{CollapseRules, Ending, Goal, simplify};
+use crate::technique::guarded::{GuardedMesh, StarRules};
 use crate::watch::{Cancelled, Watch};
 
 /// Least and mean stretch that optimised coarsening asks of new stars, in falling steps.
@@ -61,7 +62,7 @@ pub(super) struct Descent<'r> {
 }
 
 impl<'r> Descent<'r> {
-    pub(super) fn new(editor: &Editor<'_>, rules: &'r CollapseRules, goal: Goal) -> Self {
+    pub(super) fn new(guarded: &GuardedMesh<'_>, rules: &'r CollapseRules, goal: Goal) -> Self {
         let first: &[(f64, f64)] = if goal.mean_stretch > 0.0 { &SMALL_STEPS } else { &COMFORT };
         let steps = [first, &LESS_COMFORT].concat();
         let spare = if goal.mean_stretch > 0.0 { COST_OF_REPAIRS } else { 0.0 };
@@ -71,7 +72,7 @@ impl<'r> Descent<'r> {
             goal,
             steps,
             place: 0,
-            start: editor.mesh().face_count(),
+            start: guarded.mesh().face_count(),
             floor: 0.0,
             gain: 0.0,
             ended: 0.0,
@@ -82,22 +83,21 @@ impl<'r> Descent<'r> {
     /// The steps, then, for a number of faces, all that the rules allow.
     pub(super) fn go_down(
         &mut self,
-        editor: &mut Editor<'_>,
+        guarded: &mut GuardedMesh<'_>,
         refusals: &mut Refusals,
         watch: &Watch,
     ) -> Result<Ending, Cancelled> {
         let mut ending = Ending::Exhausted;
         while let Some(&(least, mean)) = self.steps.get(self.place) {
-            if self.place + LESS_COMFORT.len() >= self.steps.len() && self.is_coarsened(editor) {
+            if self.place + LESS_COMFORT.len() >= self.steps.len() && self.is_coarsened(guarded) {
                 break;
             }
-            let rules =
-                CollapseRules { min_stretch: least.max(self.rules.min_stretch), mean_stretch: mean, ..*self.rules };
-            let before = editor.mesh().face_count();
-            ending = self.step(editor, &rules, refusals, watch)?;
+            let rules = careful(self.rules, least, mean);
+            let before = guarded.mesh().face_count();
+            ending = self.step(guarded, &rules, refusals, watch)?;
             match ending {
                 Ending::Target => return Ok(ending),
-                Ending::Mean if self.is_at_floor(editor) || !is_much(before, editor.mesh().face_count()) => {
+                Ending::Mean if self.is_at_floor(guarded) || !is_much(before, guarded.mesh().face_count()) => {
                     return Ok(ending);
                 }
                 Ending::Mean => {}
@@ -105,11 +105,12 @@ impl<'r> Descent<'r> {
             }
         }
         let (mut comfort, _) = COMFORT[COMFORT.len() - 1];
-        while ending == Ending::Exhausted && self.goal.faces > 0 && comfort > self.rules.min_stretch {
-            comfort = (comfort - 0.1).max(self.rules.min_stretch);
-            let rules = CollapseRules { min_stretch: comfort, ..*self.rules };
-            ending = simplify(editor, &rules, Goal { mean_stretch: self.floor, ..self.goal }, watch)?;
-            optimise_with(editor, 1, refusals, watch)?;
+        while ending == Ending::Exhausted && self.goal.faces > 0 && comfort > self.rules.star.min_stretch {
+            comfort = (comfort - 0.1).max(self.rules.star.min_stretch);
+            let star = StarRules { min_stretch: comfort, ..self.rules.star };
+            let rules = CollapseRules { star, ..*self.rules };
+            ending = simplify(guarded, &rules, Goal { mean_stretch: self.floor, ..self.goal }, watch)?;
+            optimise_with(guarded, 1, refusals, watch)?;
         }
         Ok(ending)
     }
@@ -119,16 +120,16 @@ impl<'r> Descent<'r> {
     /// can be asked where that is less than the goal.
     fn step(
         &mut self,
-        editor: &mut Editor<'_>,
+        guarded: &mut GuardedMesh<'_>,
         rules: &CollapseRules,
         refusals: &mut Refusals,
         watch: &Watch,
     ) -> Result<Ending, Cancelled> {
         let goal = Goal { mean_stretch: (self.floor - COUNTED_ON * self.gain).max(0.0), ..self.goal };
-        let ending = simplify(editor, rules, goal, watch)?;
-        let before = editor.mean_stretch();
-        optimise_with(editor, ROUNDS[0], refusals, watch)?;
-        let after = editor.mean_stretch();
+        let ending = simplify(guarded, rules, goal, watch)?;
+        let before = guarded.mean_stretch();
+        optimise_with(guarded, ROUNDS[0], refusals, watch)?;
+        let after = guarded.mean_stretch();
         self.gain = (after - before).max(0.0);
         self.ended = after;
         if self.floor == 0.0 && self.goal.mean_stretch > 0.0 {
@@ -137,17 +138,17 @@ impl<'r> Descent<'r> {
         Ok(ending)
     }
 
-    fn is_coarsened(&self, editor: &Editor<'_>) -> bool {
-        (editor.mesh().face_count() as f64) < (1.0 - COARSENED) * self.start as f64
+    fn is_coarsened(&self, guarded: &GuardedMesh<'_>) -> bool {
+        (guarded.mesh().face_count() as f64) < (1.0 - COARSENED) * self.start as f64
     }
 
-    fn is_at_floor(&self, editor: &Editor<'_>) -> bool {
-        editor.mean_stretch() < self.floor + CLOSE
+    fn is_at_floor(&self, guarded: &GuardedMesh<'_>) -> bool {
+        guarded.mean_stretch() < self.floor + CLOSE
     }
 
     /// Sets the floor by what the rounds at the end have gained. Whether that leaves something to do.
-    pub(super) fn may_go_on(&mut self, editor: &Editor<'_>) -> bool {
-        let mean = editor.mean_stretch();
+    pub(super) fn may_go_on(&mut self, guarded: &GuardedMesh<'_>) -> bool {
+        let mean = guarded.mean_stretch();
         self.returns += 1;
         self.floor = self.goal.mean_stretch - COUNTED_ON_AT_END * (mean - self.ended).max(0.0);
         self.returns <= RETURNS && mean > self.goal.mean_stretch + CLOSE_AT_END

@@ -5,11 +5,10 @@
 
 use glam::DVec3;
 
-use super::Gain;
 use crate::mesh::geometry::area_vector;
 use crate::mesh::halfedge::{HalfedgeMesh, halfedge_of, twin};
 use crate::mesh::{EdgeId, Freedom, VertexId};
-use crate::technique::collapse::Editor;
+use crate::technique::guarded::{Gain, GuardedMesh};
 use crate::watch::{Cancelled, Watch};
 
 /// What was refused, each with one gain in mind.
@@ -37,16 +36,16 @@ impl Ages {
 }
 
 /// Halves edges above the size limit, longest first.
-pub(super) fn split_long_edges(editor: &mut Editor<'_>, watch: &Watch) -> Result<(), Cancelled> {
-    if editor.limits().max_size.is_unlimited() {
+pub(super) fn split_long_edges(guarded: &mut GuardedMesh<'_>, watch: &Watch) -> Result<(), Cancelled> {
+    if guarded.limits().max_size.is_unlimited() {
         return Ok(());
     }
-    let mesh = editor.mesh();
+    let mesh = guarded.mesh();
     let mut long: Vec<(f64, EdgeId)> = Vec::new();
     for e in mesh.edges() {
         let [a, b] = mesh.ends(e).map(|v| mesh.point(v));
         let length = (b - a).length();
-        if length > editor.limits().max_size.at(0.5 * (a + b)) {
+        if length > guarded.limits().max_size.at(0.5 * (a + b)) {
             long.push((length, e));
         }
     }
@@ -55,34 +54,35 @@ pub(super) fn split_long_edges(editor: &mut Editor<'_>, watch: &Watch) -> Result
         if place.is_multiple_of(64) {
             watch.check()?;
         }
-        let [a, b] = editor.mesh().ends(e).map(|v| editor.mesh().point(v));
-        editor.try_split(e, 0.5 * (a + b));
+        let [a, b] = guarded.mesh().ends(e).map(|v| guarded.mesh().point(v));
+        // Refused ones are told by the recount.
+        let _ = guarded.split(e, 0.5 * (a + b));
     }
     Ok(())
 }
 
 /// Flips every edge that gains, past those refused before. Returns how many.
-pub fn flip_edges(editor: &mut Editor<'_>, refusals: &mut Refusals, watch: &Watch) -> Result<usize, Cancelled> {
+pub fn flip_edges(guarded: &mut GuardedMesh<'_>, refusals: &mut Refusals, watch: &Watch) -> Result<usize, Cancelled> {
     let mut flips = 0;
-    for e in (0..editor.mesh().edge_slots()).map(EdgeId::new) {
+    for e in (0..guarded.mesh().edge_slots()).map(EdgeId::new) {
         if e.index().is_multiple_of(256) {
             watch.check()?;
         }
-        if !editor.mesh().edge_is_live(e) || refusals.flips.knows(e.index(), edge_age(editor, e)) {
+        if !guarded.mesh().edge_is_live(e) || refusals.flips.knows(e.index(), edge_age(guarded, e)) {
             continue;
         }
-        if editor.try_flip(e, Gain::LeastStretch) {
+        if guarded.flip(e, Gain::LeastStretch).is_ok() {
             flips += 1;
         } else {
-            refusals.flips.note(e.index(), edge_age(editor, e));
+            refusals.flips.note(e.index(), edge_age(guarded, e));
         }
     }
     Ok(flips)
 }
 
 /// Changes when a face at an edge, or the valence of one of their corners, changes.
-fn edge_age(editor: &Editor<'_>, e: EdgeId) -> u32 {
-    let mesh = editor.mesh();
+fn edge_age(guarded: &GuardedMesh<'_>, e: EdgeId) -> u32 {
+    let mesh = guarded.mesh();
     let h = halfedge_of(e);
     let corners = [Some(mesh.origin(h)), Some(mesh.target(h)), mesh.apex(h), mesh.apex(twin(h))];
     corners.into_iter().flatten().fold(0, |age, v| age.wrapping_add(mesh.version(v)))
@@ -90,33 +90,33 @@ fn edge_age(editor: &Editor<'_>, e: EdgeId) -> u32 {
 
 /// Moves every vertex that gains, past those refused before. Returns how many.
 pub fn relax_vertices(
-    editor: &mut Editor<'_>,
+    guarded: &mut GuardedMesh<'_>,
     refusals: &mut Refusals,
     watch: &Watch,
-    relax: impl Fn(&mut Editor<'_>, VertexId) -> bool,
+    relax: impl Fn(&mut GuardedMesh<'_>, VertexId) -> bool,
 ) -> Result<usize, Cancelled> {
     let mut moves = 0;
-    for v in (0..editor.mesh().vertex_slots()).map(VertexId::new) {
+    for v in (0..guarded.mesh().vertex_slots()).map(VertexId::new) {
         if v.index().is_multiple_of(256) {
             watch.check()?;
         }
-        if !editor.mesh().vertex_is_live(v) || refusals.moves.knows(v.index(), editor.mesh().version(v)) {
+        if !guarded.mesh().vertex_is_live(v) || refusals.moves.knows(v.index(), guarded.mesh().version(v)) {
             continue;
         }
-        if relax(editor, v) {
+        if relax(guarded, v) {
             moves += 1;
         } else {
-            refusals.moves.note(v.index(), editor.mesh().version(v));
+            refusals.moves.note(v.index(), guarded.mesh().version(v));
         }
     }
     Ok(moves)
 }
 
 /// Relaxation of a vertex: a free one tangentially, one on a curve along it.
-pub(super) fn relax(editor: &mut Editor<'_>, v: VertexId, gain: Gain) -> bool {
-    match editor.mesh().vertex_freedom(v) {
-        Freedom::Free => relax_tangentially(editor, v, gain),
-        Freedom::OnCurve => relax_along_curve(editor, v, gain),
+pub(super) fn relax(guarded: &mut GuardedMesh<'_>, v: VertexId, gain: Gain) -> bool {
+    match guarded.mesh().vertex_freedom(v) {
+        Freedom::Free => relax_tangentially(guarded, v, gain),
+        Freedom::OnCurve => relax_along_curve(guarded, v, gain),
         Freedom::Keep => false,
     }
 }
@@ -140,13 +140,13 @@ pub fn towards_centroid(mesh: &HalfedgeMesh, v: VertexId) -> Option<(DVec3, DVec
 }
 
 /// Towards the area-weighted centroid of the star, back onto the reference.
-fn relax_tangentially(editor: &mut Editor<'_>, v: VertexId, gain: Gain) -> bool {
-    let at = editor.mesh().point(v);
-    let Some((tangential, _)) = towards_centroid(editor.mesh(), v) else { return false };
+fn relax_tangentially(guarded: &mut GuardedMesh<'_>, v: VertexId, gain: Gain) -> bool {
+    let at = guarded.mesh().point(v);
+    let Some((tangential, _)) = towards_centroid(guarded.mesh(), v) else { return false };
     for share in [1.0, 0.4] {
         let wish = at + share * tangential;
-        let to = editor.keeper.project(wish).unwrap_or(wish);
-        if editor.try_move(v, to, gain) {
+        let to = guarded.project(wish).unwrap_or(wish);
+        if guarded.relocate(v, to, gain).is_ok() {
             return true;
         }
     }
@@ -154,13 +154,13 @@ fn relax_tangentially(editor: &mut Editor<'_>, v: VertexId, gain: Gain) -> bool 
 }
 
 /// Towards the middle between the neighbours on the curve, back onto the reference's curve.
-fn relax_along_curve(editor: &mut Editor<'_>, v: VertexId, gain: Gain) -> bool {
-    let Some([a, b]) = editor.curve_neighbours(v) else { return false };
-    let mesh = editor.mesh();
+fn relax_along_curve(guarded: &mut GuardedMesh<'_>, v: VertexId, gain: Gain) -> bool {
+    let Some([a, b]) = guarded.curve_neighbours(v) else { return false };
+    let mesh = guarded.mesh();
     let (at, middle) = (mesh.point(v), 0.5 * (mesh.point(a) + mesh.point(b)));
     for share in [1.0, 0.5, 0.2] {
-        let Some(to) = editor.keeper.project_to_curve(at + share * (middle - at)) else { return false };
-        if editor.try_move(v, to, gain) {
+        let Some(to) = guarded.project_to_curve(at + share * (middle - at)) else { return false };
+        if guarded.relocate(v, to, gain).is_ok() {
             return true;
         }
     }

@@ -5,28 +5,27 @@
 //! turns into better shapes (M. Botsch, L. Kobbelt, SGP 2004); they gain nothing at once, so that they are admitted
 //! where no face falls below [`FLOOR`], and must lower the sum of squared deviations, so that they end.
 
-use super::Gain;
 use crate::mesh::edit::check_flip;
 use crate::mesh::geometry::angle;
 use crate::mesh::halfedge::HalfedgeMesh;
 use crate::mesh::id::{IdVec, Vertex};
 use crate::mesh::{EdgeId, VertexId};
-use crate::technique::collapse::Editor;
+use crate::technique::guarded::{Gain, GuardedMesh};
 use crate::watch::{Cancelled, Watch};
 
 /// No face falls below this stretch by a flip that only lowers valences; relaxation lifts it again.
 const FLOOR: f64 = 0.5;
 
 /// Flips edges whose four vertices come nearer to their valences. Returns how many.
-pub(super) fn flip_to_regular(editor: &mut Editor<'_>, watch: &Watch) -> Result<usize, Cancelled> {
-    let ideal = ideal_valences(editor.mesh());
+pub(super) fn flip_to_regular(guarded: &mut GuardedMesh<'_>, watch: &Watch) -> Result<usize, Cancelled> {
+    let ideal = ideal_valences(guarded.mesh());
     let mut flips = 0;
-    for e in (0..editor.mesh().edge_slots()).map(EdgeId::new) {
+    for e in (0..guarded.mesh().edge_slots()).map(EdgeId::new) {
         if e.index().is_multiple_of(256) {
             watch.check()?;
         }
-        if editor.mesh().edge_is_live(e) && regularises(editor.mesh(), e, &ideal) {
-            flips += usize::from(editor.try_flip(e, Gain::Keep(FLOOR)));
+        if guarded.mesh().edge_is_live(e) && regularises(guarded.mesh(), e, &ideal) {
+            flips += usize::from(guarded.flip(e, Gain::Keep(FLOOR)).is_ok());
         }
     }
     Ok(flips)

@@ -10,16 +10,16 @@ use crate::technique::quadric::Quadric;
 
 /// Plane and line quadrics of the vertices, about a local origin.
 #[derive(Debug, Default)]
-pub struct Quadrics {
+pub(super) struct Quadrics {
     /// What the quadrics are about.
-    pub origin: DVec3,
+    pub(super) origin: DVec3,
     planes: Vec<Quadric>,
     lines: FxHashMap<VertexId, Quadric>,
 }
 
 impl Quadrics {
     /// The quadrics of a fresh mesh. `feature_weight` is the weight of the sharpest marked edges.
-    pub fn new(mesh: &HalfedgeMesh, feature_weight: f64) -> Self {
+    pub(super) fn new(mesh: &HalfedgeMesh, feature_weight: f64) -> Self {
         let bounds = Aabb::of(mesh.vertices().map(|v| mesh.point(v)));
         let origin = if bounds.is_empty() { DVec3::ZERO } else { bounds.centre() };
         let mut this =
@@ -49,12 +49,12 @@ impl Quadrics {
     }
 
     /// The planes gathered at a vertex.
-    pub fn planes(&self, v: VertexId) -> &Quadric {
+    pub(super) fn planes(&self, v: VertexId) -> &Quadric {
         &self.planes[v.index()]
     }
 
     /// The lines gathered at a vertex.
-    pub fn lines(&self, v: VertexId) -> Quadric {
+    pub(super) fn lines(&self, v: VertexId) -> Quadric {
         if self.lines.is_empty() {
             return Quadric::default();
         }
@@ -62,7 +62,7 @@ impl Quadrics {
     }
 
     /// Gives the planes and lines of a vertex that is gone to the one it became.
-    pub fn merge(&mut self, gone: VertexId, kept: VertexId) {
+    pub(super) fn merge(&mut self, gone: VertexId, kept: VertexId) {
         let planes = self.planes[gone.index()];
         self.planes[kept.index()].add(&planes);
         if let Some(lines) = self.lines.remove(&gone) {
@@ -71,7 +71,7 @@ impl Quadrics {
     }
 
     /// Gives a new vertex the planes of the faces round it.
-    pub fn found(&mut self, mesh: &HalfedgeMesh, v: VertexId) {
+    pub(super) fn found(&mut self, mesh: &HalfedgeMesh, v: VertexId) {
         if v.index() >= self.planes.len() {
             self.planes.resize(v.index() + 1, Quadric::default());
         }
@@ -79,7 +79,7 @@ impl Quadrics {
     }
 
     /// The planes of the faces round a vertex as they are now.
-    pub fn around(&self, mesh: &HalfedgeMesh, v: VertexId) -> Quadric {
+    pub(super) fn around(&self, mesh: &HalfedgeMesh, v: VertexId) -> Quadric {
         let mut sum = Quadric::default();
         for f in mesh.faces_around(v) {
             if let Some(plane) = self.plane(mesh, f) {

@@ -7,14 +7,14 @@
 use glam::DVec3;
 
 use super::boxes::{BoxTree, Near, SmallBox};
-use super::drift::Drift;
+use super::certificate::Drift;
 use crate::mesh::halfedge::HalfedgeMesh;
 use crate::mesh::predicate::triangle_triangle;
 use crate::mesh::{FaceId, VertexId};
 
 /// The faces of a workshop, to be asked for intersections.
 #[derive(Clone, Debug)]
-pub struct Collision {
+pub(super) struct Collision {
     tree: BoxTree,
     star: Drift,
     new_boxes: Vec<SmallBox>,
@@ -23,28 +23,28 @@ pub struct Collision {
 
 impl Collision {
     /// Of all live faces.
-    pub fn new(mesh: &HalfedgeMesh) -> Self {
+    pub(super) fn new(mesh: &HalfedgeMesh) -> Self {
         Self { tree: BoxTree::new(mesh), star: Drift::default(), new_boxes: Vec::new(), near: Vec::new() }
     }
 
     /// Tells of a face that has changed, or of a new one that lies where `sibling` lies.
-    pub fn update(&mut self, face: FaceId, corners: [VertexId; 3], points: [DVec3; 3], sibling: FaceId) {
+    pub(super) fn update(&mut self, face: FaceId, corners: [VertexId; 3], points: [DVec3; 3], sibling: FaceId) {
         self.tree.update(face, corners, points, sibling);
     }
 
     /// Tells of a face that is gone.
-    pub fn forget(&mut self, face: FaceId) {
+    pub(super) fn forget(&mut self, face: FaceId) {
         self.tree.forget(face);
     }
 
     /// Keeps queries fast after many changes.
-    pub fn tidy(&mut self, mesh: &HalfedgeMesh) {
+    pub(super) fn tidy(&mut self, mesh: &HalfedgeMesh) {
         self.tree.tidy(mesh);
     }
 
     /// Whether a new face would meet another new one, or a face that stays, where they share no corner or edge. New
     /// ones that are known to be one sheet do not meet each other.
-    pub fn hits(&mut self, mesh: &HalfedgeMesh, old: &[FaceId], new: &[[DVec3; 3]], is_sheet: bool) -> bool {
+    pub(super) fn hits(&mut self, mesh: &HalfedgeMesh, old: &[FaceId], new: &[[DVec3; 3]], is_sheet: bool) -> bool {
         let is_sheet = is_sheet || self.star.sees_sheet(new);
         !is_sheet && meet_each_other(new) || self.first_hit(mesh, old, new, |_| false)
     }
@@ -52,7 +52,7 @@ impl Collision {
     /// As [`Collision::hits`], for new faces that are the old ones cut otherwise: where one of those met another, or a
     /// face that stays, any of the new ones may meet the same. Even here faces must be tested, since a new corner is
     /// rounded off the old faces, and the other side of a needle or of a thin sheet is nearer than that.
-    pub fn hits_more(
+    pub(super) fn hits_more(
         &mut self,
         mesh: &HalfedgeMesh,
         old: &[FaceId],

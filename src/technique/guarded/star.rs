@@ -7,17 +7,13 @@
 
 use glam::DVec3;
 
-use super::priority::Tally;
+use super::normals::{HAS_NORMAL, LEAST_TURN_COSINE, agree};
+use super::refused::Refused;
+use super::tally::Tally;
 use crate::mesh::edit::CollapsePlan;
 use crate::mesh::geometry::area_vector;
 use crate::mesh::halfedge::{HalfedgeMesh, twin};
 use crate::mesh::{FaceId, HalfedgeId, VertexId};
-
-/// Faces may turn by at most 45 degrees in one edit.
-pub(in crate::technique) const LEAST_TURN_COSINE: f64 = std::f64::consts::FRAC_1_SQRT_2;
-
-/// A face below this stretch has no normal that other faces should be held against.
-pub(in crate::technique) const HAS_NORMAL: f64 = 0.05;
 
 /// Stretch is computed here with other roundings than when a result is recounted.
 const ROUNDING: f64 = 1.0 + 1e-12;
@@ -71,13 +67,14 @@ pub(super) struct Star {
     /// How many of the survivors hang on the vanishing vertex; the others hang on the kept one.
     of_removed: usize,
     pub(super) before: Tally,
-    /// Stretch and size of the survivors with the last candidate that passed.
-    pub(super) shapes: Vec<Shape>,
+    /// How often a star was walked, to tell plans that are out of date.
+    pub(super) age: u64,
 }
 
 impl Star {
     /// Walks round both ends. Returns the larger of the valences now, and the valence of the merged vertex.
     pub(super) fn walk(&mut self, mesh: &HalfedgeMesh, plan: &CollapsePlan) -> (usize, usize) {
+        self.age += 1;
         self.ring.clear();
         self.survivors.clear();
         let (h, t) = (plan.halfedge, twin(plan.halfedge));
@@ -171,12 +168,11 @@ impl Star {
     }
 
     /// The tally of the survivors with the merged vertex at `p`, where they keep the bounds and none folds over.
-    pub(super) fn assess(&mut self, mesh: &HalfedgeMesh, p: DVec3, bounds: Bounds) -> Option<Tally> {
+    pub(super) fn assess(&mut self, mesh: &HalfedgeMesh, p: DVec3, bounds: Bounds) -> Result<Tally, Refused> {
         for neighbour in &mut self.ring {
             neighbour.spoke = neighbour.point - p;
             neighbour.length = neighbour.spoke.length();
         }
-        self.shapes.clear();
         let mut after = Tally::short_of(self.before.threshold);
         let mut has_slivers = false;
         let floor = bounds.floor * ROUNDING;
@@ -184,7 +180,7 @@ impl Star {
             let [a, b] = survivor.side.map(|at| &self.ring[at as usize]);
             let normal = a.spoke.cross(b.spoke);
             if survivor.has_normal && normal.dot(survivor.normal) <= 0.0 {
-                return None;
+                return Err(Refused::FoldOver);
             }
             let area = normal.length();
             let size = a.length.max(b.length).max(survivor.length);
@@ -196,13 +192,12 @@ impl Star {
             let has_turned =
                 survivor.has_normal && normal.dot(survivor.normal) < LEAST_TURN_COSINE * area * survivor.area;
             if !is_good || has_turned {
-                return None;
+                return Err(if is_good { Refused::FoldOver } else { Refused::Shape });
             }
             has_slivers |= !survivor.has_normal;
             after.add_stretch(stretch);
-            self.shapes.push(Shape { stretch: stretch as f32, size: size as f32 });
         }
-        (!has_slivers || self.slivers_agree(mesh)).then_some(after)
+        if !has_slivers || self.slivers_agree(mesh) { Ok(after) } else { Err(Refused::FoldOver) }
     }
 
     /// Whether the faces that take the place of slivers look the way an old face looks that has a normal, or all old
@@ -232,12 +227,6 @@ impl Star {
             (s.face, [p, a, b])
         })
     }
-}
-
-/// Whether one normal turns little against another.
-fn agree(m: DVec3, n: DVec3) -> bool {
-    let scale = (m.length_squared() * n.length_squared()).sqrt();
-    scale > 0.0 && m.dot(n) >= LEAST_TURN_COSINE * scale
 }
 
 #[cfg(test)]
@@ -280,10 +269,10 @@ mod tests {
             let faces: Vec<[DVec3; 3]> = star.new_faces(p).map(|(_, points)| points).collect();
             assert_eq!(faces, expected);
             let tally = star.assess(&mesh, p, Bounds { floor: 0.0, ceiling: f64::INFINITY });
-            let Some(tally) = tally else { continue };
+            let Ok(tally) = tally else { continue };
             let least = expected.iter().map(|&t| stretch(t)).fold(1.0, f64::min);
             assert!((tally.stretch_min - least).abs() < 1e-12);
-            assert!(star.assess(&mesh, p, Bounds { floor: least * 1.001, ceiling: f64::INFINITY }).is_none());
+            assert!(star.assess(&mesh, p, Bounds { floor: least * 1.001, ceiling: f64::INFINITY }).is_err());
         }
     }
 }

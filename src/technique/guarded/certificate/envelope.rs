@@ -51,22 +51,22 @@ const SAME: f64 = 2e-6;
 
 /// An edit as the zone sees it.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Change<'e> {
+pub(in crate::technique::guarded) struct Change<'e> {
     /// The faces replaced.
-    pub(super) old: &'e [FaceId],
+    pub(in crate::technique::guarded) old: &'e [FaceId],
     /// Their corners.
-    pub(super) was: &'e [Triangle],
+    pub(in crate::technique::guarded) was: &'e [Triangle],
     /// Their successors.
-    pub(super) new: &'e [Triangle],
+    pub(in crate::technique::guarded) new: &'e [Triangle],
     /// Faces next to them that stay.
-    pub(super) beside: &'e [Triangle],
+    pub(in crate::technique::guarded) beside: &'e [Triangle],
     /// Whether the surface stays as it is, as a set of points.
-    pub(super) is_same: bool,
+    pub(in crate::technique::guarded) is_same: bool,
 }
 
 /// The tolerance zone of a reference, and who covers which piece of it.
 #[derive(Debug)]
-pub struct Envelope<'a> {
+pub(in crate::technique::guarded) struct Envelope<'a> {
     reference: &'a Surface,
     tree: &'a TriangleBvh,
     reach: f64,
@@ -89,7 +89,7 @@ pub struct Envelope<'a> {
 impl<'a> Envelope<'a> {
     /// The zone of `tolerance` round the reference, covered by the faces of `mesh`, whose hierarchy is `own`; without
     /// one, the mesh is the reference, face by face.
-    pub fn new(
+    pub(in crate::technique::guarded) fn new(
         reference: &'a Surface,
         tree: &'a TriangleBvh,
         tolerance: f64,
@@ -120,14 +120,9 @@ impl<'a> Envelope<'a> {
         }
     }
 
-    /// Pieces of the reference that were further than the tolerance from the surface at the beginning.
-    pub fn uncovered(&self) -> usize {
-        self.cover.uncovered
-    }
-
     /// Whether the whole surface and the whole reference lie within `tolerance` of each other: by what edits have kept,
     /// and where no edit came by, by the full test. The reference's side is what the pieces stand for.
-    pub fn certifies(&mut self, mesh: &HalfedgeMesh, tolerance: f64) -> bool {
+    pub(in crate::technique::guarded) fn certifies(&mut self, mesh: &HalfedgeMesh, tolerance: f64) -> bool {
         // Edits keep a little less than the tolerance. Parts smaller than the rest pass wherever the surface does; how
         // finely an edit was tested says nothing here, as its faces are cut in another order.
         let kept = (self.reach, self.finest);
@@ -146,35 +141,30 @@ impl<'a> Envelope<'a> {
     ///
     /// A bound of a new face is that of the old faces below it and the gap between them. The same gap takes whatever
     /// lies on the old faces to the new one, so the bounds of all faces hold for the reference's points as well.
-    pub fn traced(&self, mesh: &HalfedgeMesh) -> Option<f64> {
+    pub(in crate::technique::guarded) fn traced(&self, mesh: &HalfedgeMesh) -> Option<f64> {
         let strays = mesh.faces().map(|f| f64::from(self.strays[f.index()]));
         self.is_traced.then(|| strays.fold(0.0, f64::max))
     }
 
     /// The distance that edits keep.
-    pub fn reach(&self) -> f64 {
+    pub(in crate::technique::guarded) fn reach(&self) -> f64 {
         self.reach
     }
 
     /// The point of the reference nearest to `p`, and the face it lies on.
-    pub fn project(&self, p: DVec3) -> Option<(DVec3, FaceId)> {
+    pub(in crate::technique::guarded) fn project(&self, p: DVec3) -> Option<(DVec3, FaceId)> {
         self.tree.closest(p).map(|c| (c.nearest.point, c.face()))
     }
 
     /// As [`Envelope::project`], with a face that is probably near: the same answer, found faster where it is.
-    pub fn project_near(&self, p: DVec3, face: FaceId) -> Option<DVec3> {
+    pub(in crate::technique::guarded) fn project_near(&self, p: DVec3, face: FaceId) -> Option<DVec3> {
         let bound = closest_on_triangle(p, self.reference.corners(face)).distance_squared;
         self.tree.closest_within(p, bound).map(|c| c.nearest.point)
     }
 
-    /// Whether `p` lies within the tolerance.
-    pub fn contains(&self, p: DVec3) -> bool {
-        self.tree.near(p, self.reach * self.reach, self.reach * self.reach).is_some()
-    }
-
     /// Whether the edit keeps the tolerance both ways. On `true`, the new owners and bounds wait for
     /// [`Envelope::commit`].
-    pub(super) fn admits(&mut self, change: &Change<'_>) -> bool {
+    pub(in crate::technique::guarded) fn admits(&mut self, change: &Change<'_>) -> bool {
         let mut known = std::mem::take(&mut self.known);
         let mut found = std::mem::take(&mut self.found);
         known.clear();
@@ -196,7 +186,7 @@ impl<'a> Envelope<'a> {
     }
 
     /// Whether the faces of the last edit tested were seen not to meet each other but where they touch.
-    pub(super) fn is_sheet(&self) -> bool {
+    pub(in crate::technique::guarded) fn is_sheet(&self) -> bool {
         self.drift.is_sheet
     }
 
@@ -290,7 +280,7 @@ impl<'a> Envelope<'a> {
 
     /// Makes what the last check that said `true` found hold: `targets` are the new faces in its order, then those
     /// beside.
-    pub(super) fn commit(&mut self, old: &[FaceId], targets: &[FaceId]) {
+    pub(in crate::technique::guarded) fn commit(&mut self, old: &[FaceId], targets: &[FaceId]) {
         let most = targets.iter().map(|f| f.index() + 1).max().unwrap_or(0);
         self.strays.resize(self.strays.len().max(most), f32::INFINITY);
         for (face, &bound) in targets.iter().zip(&self.found) {

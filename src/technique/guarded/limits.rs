@@ -2,8 +2,8 @@
 
 use glam::DVec3;
 
+use crate::mesh::Surface;
 use crate::mesh::bvh::TriangleBvh;
-use crate::mesh::{Surface, VertexId};
 
 /// A length that may vary over the surface.
 #[derive(Clone, Debug)]
@@ -53,26 +53,28 @@ pub struct Limits {
     pub max_valence: usize,
 }
 
+/// What the new star of a merged vertex must keep besides the limits, tolerance and embedding.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct StarRules {
+    /// Least stretch of the new faces; where a face of the old star is below it, no less than that one.
+    pub min_stretch: f64,
+    /// Least mean stretch of the new faces; where the mean of the old star is below it, no less than that.
+    pub mean_stretch: f64,
+    /// Where given, the star must come nearer to this stretch: see [`super::Tally::mends`].
+    pub mend_below: Option<f64>,
+}
+
 /// The least stretch of a new face, where the faces that it replaces reach down to `before`: the limit, or what was
 /// there already where that breaks it. Allows for the single precision in which stretch is kept.
-pub fn least_stretch(limit: f64, before: f64) -> f64 {
+pub(super) fn least_stretch(limit: f64, before: f64) -> f64 {
     if before < limit * (1.0 - 1e-6) { before } else { limit }
 }
 
 impl Limits {
     /// The longest side of a new face near `p`, where the faces that it replaces reach `before`: the limit, or what was
     /// there already where that breaks it. The comparison allows for the single precision in which sizes are kept.
-    pub fn ceiling(&self, p: DVec3, before: f64) -> f64 {
+    pub(super) fn ceiling(&self, p: DVec3, before: f64) -> f64 {
         let limit = self.max_size.at(p);
         if before > limit * (1.0 + 1e-6) { before } else { limit }
     }
-}
-
-/// A face as an edit would make it.
-#[derive(Clone, Copy, Debug)]
-pub struct NewFace {
-    /// Its corners' numbers; a vertex that is yet to come has the number of one that is there.
-    pub vertices: [VertexId; 3],
-    /// Its corners.
-    pub points: [DVec3; 3],
 }

@@ -1,109 +1,16 @@
-//! Opening a guarded workshop for a step, and recounting the thresholds on what came out of it.
+//! Recounting the thresholds on what came out of a guarded mesh.
 //!
 //! A step never claims a threshold: [`recount`] measures the result anew and names the faces that break one, with the
 //! cause where geometry or the user forbids better.
 
 use glam::DVec3;
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
-use super::corners::free_close_corners;
-use super::editor::Editor;
-use super::envelope::Envelope;
-use super::keeper::{Curves, Keeper};
 use super::limits::{Limits, SizeField};
-use crate::mesh::bvh::TriangleBvh;
-use crate::mesh::geometry::{Aabb, angle, stretch, triangle_size};
-use crate::mesh::halfedge::{EnterError, HalfedgeMesh};
+use crate::mesh::geometry::{angle, stretch, triangle_size};
 use crate::mesh::{FaceId, Freedom, IdVec, ResolvedFreedom, Surface, VertexId, edge_key};
 use crate::metric::shape::best_stretch_with_angle;
-
-/// What a tolerance means.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum ToleranceMode {
-    /// The sum of squared distances to the planes of all faces merged so far: the measure of the papers. A squared
-    /// length, so a plain number; it grows with the density of the input.
-    QuadricSum,
-    /// The root mean square of the distances to those planes: a length. Fast, and no bound of the distance.
-    QuadricRms,
-    /// The largest distance between result and reference, both ways, kept by certified tests: a length.
-    #[default]
-    Distance,
-}
-
-/// What a workshop is opened with.
-#[derive(Clone, Debug)]
-pub struct Setup {
-    /// The meaning of `tolerance`.
-    pub mode: ToleranceMode,
-    /// In mesh units, or their square in [`ToleranceMode::QuadricSum`].
-    pub tolerance: f64,
-    /// How far marked curves may move, in mesh units.
-    pub feature_tolerance: f64,
-    /// The weight of the sharpest lines in the quadrics.
-    pub feature_weight: f64,
-    /// Thresholds.
-    pub limits: Limits,
-    /// Whether corners nearer to each other than `feature_tolerance` may become one; not where elements are locked.
-    pub may_merge_corners: bool,
-}
-
-/// The hierarchy over the reference that a tolerance of this meaning needs: an empty one for the quadrics.
-pub fn reference_tree(mode: ToleranceMode, reference: &Surface) -> TriangleBvh {
-    match mode {
-        ToleranceMode::Distance => TriangleBvh::of_surface(reference),
-        ToleranceMode::QuadricSum | ToleranceMode::QuadricRms => TriangleBvh::new(Vec::new()),
-    }
-}
-
-/// The diagonal of a surface's bounding box.
-pub fn diagonal(surface: &Surface) -> f64 {
-    Aabb::of(surface.points.iter().copied()).diagonal()
-}
-
-/// Opens a guarded workshop on `surface`, held against `reference`; `tree` is [`reference_tree`].
-///
-/// # Errors
-/// A surface that is no oriented 2-manifold.
-pub fn open<'a>(
-    surface: &Surface,
-    freedom: &ResolvedFreedom,
-    reference: &'a Surface,
-    tree: &'a TriangleBvh,
-    setup: Setup,
-) -> Result<Editor<'a>, EnterError> {
-    let mut mesh = HalfedgeMesh::new(surface, freedom)?;
-    if setup.may_merge_corners
-        && let Some(loosened) = free_close_corners(&mesh, freedom, setup.feature_tolerance)
-    {
-        mesh = HalfedgeMesh::new(surface, &loosened)?;
-    }
-    let keeper = match setup.mode {
-        ToleranceMode::QuadricSum => Keeper::QuadricSum { most: setup.tolerance, weight: setup.feature_weight },
-        ToleranceMode::QuadricRms => Keeper::QuadricRms { most: setup.tolerance },
-        ToleranceMode::Distance => {
-            let is_same = surface.faces == reference.faces && surface.points == reference.points;
-            let own = (!is_same).then(|| TriangleBvh::of_surface(surface));
-            let envelope = Envelope::new(reference, tree, setup.tolerance, &mesh, own.as_ref());
-            let curves = Curves::new(curve_segments(surface, &mesh, reference), setup.feature_tolerance);
-            Keeper::Distance { envelope: Box::new(envelope), curves }
-        }
-    };
-    Ok(Editor::new(mesh, keeper, setup.limits, setup.feature_weight))
-}
-
-/// The curves that marked edges are held against: the reference's own where it has any, and those of the mesh.
-fn curve_segments(surface: &Surface, mesh: &HalfedgeMesh, reference: &Surface) -> Vec<[DVec3; 2]> {
-    let marked = reference.carried.marks.keys().map(|key| key.map(|v| reference.points[v]));
-    if reference.carried.marks.is_empty() {
-        let edges = mesh.edges().filter(|&e| mesh.edge_freedom(e) != Freedom::Free);
-        return edges.map(|e| mesh.ends(e).map(|v| surface.points[v])).collect();
-    }
-    // Rims are curves even where nobody marked them.
-    let rims = mesh.edges().filter(|&e| mesh.is_boundary_edge(e)).map(|e| mesh.ends(e).map(|v| surface.points[v]));
-    marked.chain(rims).collect()
-}
 
 /// Why a face breaks a threshold.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]

@@ -2,19 +2,19 @@
 //!
 //! Three meanings: the sum of squared distances to the accumulated planes, as Date et al. print it (a squared length,
 //! which grows with the density of the input); its root mean square (a length); and the certified two-sided distance
-//! to a reference ([`super::envelope`]). Curves are bounded in the same meaning: by the quadrics of their lines, or by
-//! their distance from the curves of the reference.
+//! to a reference ([`super::certificate`]). Curves are bounded in the same meaning: by the quadrics of their lines, or
+//! by their distance from the curves of the reference.
 
 use glam::DVec3;
 
-use super::envelope::Envelope;
+use super::certificate::Envelope;
 use crate::mesh::bvh::SegmentBvh;
 use crate::mesh::geometry::closest_on_segment;
 use crate::technique::quadric::Quadric;
 
 /// The meaning of the tolerance, with its value.
 #[derive(Debug)]
-pub enum Keeper<'a> {
+pub(super) enum Keeper<'a> {
     /// Sum of squared plane distances, a squared length.
     QuadricSum {
         /// The largest sum.
@@ -38,7 +38,7 @@ pub enum Keeper<'a> {
 
 impl Keeper<'_> {
     /// Whether a vertex with these planes and lines may lie at `x` (about the same origin), as far as quadrics say.
-    pub fn admits_point(&self, planes: &Quadric, lines: &Quadric, x: DVec3) -> bool {
+    pub(super) fn admits_point(&self, planes: &Quadric, lines: &Quadric, x: DVec3) -> bool {
         match *self {
             Self::QuadricSum { most, weight } => planes.eval(x) <= most && lines.eval(x) <= most * weight,
             Self::QuadricRms { most } => {
@@ -52,12 +52,12 @@ impl Keeper<'_> {
     }
 
     /// Whether the tolerance is the certified distance.
-    pub fn is_certified(&self) -> bool {
+    pub(super) fn is_certified(&self) -> bool {
         matches!(self, Self::Distance { .. })
     }
 
     /// The point of the reference nearest to `p`, where the tolerance has a reference.
-    pub fn project(&self, p: DVec3) -> Option<DVec3> {
+    pub(super) fn project(&self, p: DVec3) -> Option<DVec3> {
         match self {
             Self::Distance { envelope, .. } => envelope.project(p).map(|(point, _)| point),
             Self::QuadricSum { .. } | Self::QuadricRms { .. } => None,
@@ -65,7 +65,7 @@ impl Keeper<'_> {
     }
 
     /// As [`Keeper::project`] for many points near `middle`.
-    pub fn project_round(&self, middle: DVec3, points: &mut [DVec3]) {
+    pub(super) fn project_round(&self, middle: DVec3, points: &mut [DVec3]) {
         let Self::Distance { envelope, .. } = self else { return };
         let Some((_, face)) = envelope.project(middle) else { return };
         for p in points {
@@ -74,7 +74,7 @@ impl Keeper<'_> {
     }
 
     /// The point of the reference's curves nearest to `p`, where the tolerance has a reference.
-    pub fn project_to_curve(&self, p: DVec3) -> Option<DVec3> {
+    pub(super) fn project_to_curve(&self, p: DVec3) -> Option<DVec3> {
         match self {
             Self::Distance { curves, .. } => curves.project(p),
             Self::QuadricSum { .. } | Self::QuadricRms { .. } => None,
@@ -84,7 +84,7 @@ impl Keeper<'_> {
 
 /// Reference curves and how far marked edges may lie from them.
 #[derive(Debug)]
-pub struct Curves {
+pub(super) struct Curves {
     segments: Vec<[DVec3; 2]>,
     tree: SegmentBvh,
     reach: f64,
@@ -95,17 +95,17 @@ const CHECK_BUDGET: usize = 256;
 
 impl Curves {
     /// Curves made of these segments.
-    pub fn new(segments: Vec<[DVec3; 2]>, reach: f64) -> Self {
+    pub(super) fn new(segments: Vec<[DVec3; 2]>, reach: f64) -> Self {
         Self { tree: SegmentBvh::new(segments.clone()), segments, reach }
     }
 
     /// The nearest point of the curves.
-    pub fn project(&self, p: DVec3) -> Option<DVec3> {
+    pub(super) fn project(&self, p: DVec3) -> Option<DVec3> {
         self.tree.closest(p).map(|c| c.nearest.point)
     }
 
     /// Whether a segment lies within reach of the curves: the set of points near one of their segments is convex.
-    pub fn admit(&self, segment: [DVec3; 2]) -> bool {
+    pub(super) fn admit(&self, segment: [DVec3; 2]) -> bool {
         let squared = self.reach * self.reach;
         let mut stack = vec![segment];
         for _ in 0..CHECK_BUDGET {

@@ -90,7 +90,7 @@ struct Inner {
 
 /// The overlay of an edit's old and new faces.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Drift {
+pub(in crate::technique::guarded) struct Drift {
     /// Whether the new faces were seen as one sheet, in which they meet in common corners and edges only.
     pub(super) is_sheet: bool,
     sectors: Vec<Sector>,
@@ -149,7 +149,7 @@ impl Drift {
     }
 
     /// Whether the faces are a star that is seen as one sheet: then they meet in common corners and edges only.
-    pub(super) fn sees_sheet(&mut self, star: &[Triangle]) -> bool {
+    pub(in crate::technique::guarded) fn sees_sheet(&mut self, star: &[Triangle]) -> bool {
         self.spread(star).is_some()
     }
 

@@ -1,0 +1,10 @@
+//! The certificate of the distance: both sides of it, and what they cut and measure with.
+
+mod clip;
+mod cover;
+mod drift;
+mod envelope;
+mod target;
+
+pub(super) use drift::Drift;
+pub(super) use envelope::{Change, Envelope};
