@@ -23,6 +23,7 @@ mod steps {
     mod features;
     mod fit_patches;
     mod fuzz;
+    mod gates;
     mod golden;
     mod improve_quality;
     mod measure;

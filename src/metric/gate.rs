@@ -10,7 +10,7 @@ mod column;
 mod evaluate;
 mod fault;
 
-pub use evaluate::{GateError, bounds_distance, evaluate, judges_faces};
+pub use evaluate::{GateError, bounds_distance, evaluate, judge, judges_faces};
 
 /// A bound of a check, as the recipe gives it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

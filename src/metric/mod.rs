@@ -5,6 +5,7 @@ pub mod distance;
 pub mod feature;
 pub mod gate;
 pub mod intersection;
+pub mod measured;
 pub mod number;
 pub mod quad_layout;
 pub mod quad_shape;
@@ -19,6 +20,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
+pub use measured::Measured;
 use registry::{METRICS, Needs};
 pub use subject::Subject;
 
@@ -79,16 +81,21 @@ impl Measurement {
 
 /// Measures every metric that is defined: those against a reference only where there is one.
 pub fn measure(mesh: &Soup, reference: Option<&Soup>, watch: &Watch) -> Result<Measurement, Cancelled> {
-    let subject = Subject::new(mesh, reference, watch);
+    measure_kept(&Subject::new(mesh, reference, watch))
+}
+
+/// The same of a subject, which may know some of it.
+pub fn measure_kept(subject: &Subject<'_>) -> Result<Measurement, Cancelled> {
+    let watch = subject.watch();
     let mut values = BTreeMap::new();
     watch.phase("measure", Some(METRICS.len() as u64));
     for (done, metric) in METRICS.iter().enumerate() {
         watch.check()?;
         watch.advance(done as u64, || metric.name.to_owned());
-        if metric.needs == Needs::Reference && reference.is_none() {
+        if metric.needs == Needs::Reference && subject.reference().is_none() {
             continue;
         }
-        if let Some(value) = (metric.measure)(&subject) {
+        if let Some(value) = (metric.measure)(subject) {
             values.insert(metric.name.to_owned(), value);
         }
     }

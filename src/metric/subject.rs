@@ -1,12 +1,14 @@
-//! A mesh that is being measured, perhaps against a reference; what several metrics need is computed once, on demand.
+//! A mesh that is being measured, perhaps against a reference; what several metrics need is computed once, on demand,
+//! and for several who measure it once for all (`measured`).
 
-use std::sync::OnceLock;
+use std::sync::Arc;
 
 use glam::DVec3;
 
 use super::distance::{self, Target, TwoSided};
 use super::feature::{FeatureDeviation, feature_deviation};
 use super::intersection::{Intersections, self_intersections};
+use super::measured::{Alone, Measured, Pair, kept};
 use super::quad_layout::{Layout, layout_counts};
 use super::quad_shape::{QuadShapes, quad_shapes};
 use super::shape::{TriangleShapes, triangle_shapes};
@@ -32,33 +34,25 @@ pub struct Subject<'a> {
     mesh: &'a Soup,
     watch: &'a Watch,
     reference: Option<Box<Self>>,
-    extent: OnceLock<Extent>,
-    topology: OnceLock<Topology>,
-    triangles: OnceLock<TriangleShapes>,
-    quads: OnceLock<QuadShapes>,
-    layout: OnceLock<Layout>,
-    intersections: OnceLock<Intersections>,
-    target: OnceLock<Target>,
-    distance: OnceLock<Option<TwoSided>>,
-    features: OnceLock<Option<FeatureDeviation>>,
+    alone: Arc<Alone>,
+    pair: Arc<Pair>,
 }
 
 impl<'a> Subject<'a> {
     /// A mesh, and the reference that it is compared with.
     pub fn new(mesh: &'a Soup, reference: Option<&'a Soup>, watch: &'a Watch) -> Self {
+        let reference = reference.map(|reference| Box::new(Self::new(reference, None, watch)));
+        Self { mesh, watch, reference, alone: Arc::default(), pair: Arc::default() }
+    }
+
+    /// The same of meshes that keep what is measured of them.
+    pub fn kept(mesh: &'a Measured, reference: Option<&'a Arc<Measured>>, watch: &'a Watch) -> Self {
         Self {
-            mesh,
+            mesh: mesh.mesh(),
             watch,
-            reference: reference.map(|reference| Box::new(Self::new(reference, None, watch))),
-            extent: OnceLock::new(),
-            topology: OnceLock::new(),
-            triangles: OnceLock::new(),
-            quads: OnceLock::new(),
-            layout: OnceLock::new(),
-            intersections: OnceLock::new(),
-            target: OnceLock::new(),
-            distance: OnceLock::new(),
-            features: OnceLock::new(),
+            reference: reference.map(|reference| Box::new(Self::kept(reference, None, watch))),
+            alone: Arc::clone(mesh.alone()),
+            pair: reference.map_or_else(Arc::default, |reference| mesh.pair(reference)),
         }
     }
 
@@ -79,7 +73,7 @@ impl<'a> Subject<'a> {
 
     /// Bounding box, area and volume.
     pub fn extent(&self) -> &Extent {
-        self.extent.get_or_init(|| {
+        kept(&self.alone.extent, || {
             let corners = self.mesh.faces.iter().flat_map(|f| f.corners().iter().map(|&v| self.mesh.points[v]));
             let bounds = Aabb::of(corners);
             // The volume of a closed, oriented mesh does not depend on the origin, and cancels least about its centre.
@@ -97,45 +91,54 @@ impl<'a> Subject<'a> {
 
     /// Counts and topology.
     pub fn topology(&self) -> &Topology {
-        self.topology.get_or_init(|| topology(self.mesh))
+        kept(&self.alone.topology, || topology(self.mesh))
     }
 
     /// Figures of each triangle.
     pub fn triangles(&self) -> &TriangleShapes {
-        self.triangles.get_or_init(|| triangle_shapes(self.mesh))
+        kept(&self.alone.triangles, || triangle_shapes(self.mesh))
     }
 
     /// Figures of each quad.
     pub fn quads(&self) -> &QuadShapes {
-        self.quads.get_or_init(|| quad_shapes(self.mesh))
+        kept(&self.alone.quads, || quad_shapes(self.mesh))
     }
 
     /// Irregular vertices of a layout of quads.
     pub fn layout(&self) -> &Layout {
-        self.layout.get_or_init(|| layout_counts(self.mesh))
+        kept(&self.alone.layout, || layout_counts(self.mesh))
     }
 
     /// Pairs of faces that intersect. Empty when cancelled; ask the watch afterwards.
     pub fn intersections(&self) -> &Intersections {
-        self.intersections.get_or_init(|| self_intersections(self.mesh, self.watch).unwrap_or_default())
+        kept(&self.alone.intersections, || self_intersections(self.mesh, self.watch).unwrap_or_default())
     }
 
     /// The mesh prepared for distances.
     pub fn target(&self) -> &Target {
-        self.target.get_or_init(|| Target::of(self.mesh))
+        kept(&self.alone.target, || Target::of(self.mesh))
     }
 
     /// Distances to and from the reference. Absent without reference, without triangles, or when cancelled.
     pub fn distance(&self) -> Option<&TwoSided> {
         let reference = self.reference()?;
         let compute = || distance::two_sided(self.target(), reference.target(), self.watch).ok().flatten();
-        self.distance.get_or_init(compute).as_ref()
+        kept(&self.pair.distance, compute).as_ref()
+    }
+
+    /// A certified upper bound of the distance to the reference, or from it. Absent as [`Self::distance`] is; several
+    /// times cheaper than that.
+    pub fn bound(&self, from_reference: bool) -> Option<f64> {
+        let reference = self.reference()?;
+        let (from, to) = if from_reference { (reference, self) } else { (self, reference) };
+        let compute = || distance::upper_bound(from.target(), to.target(), self.watch).ok().flatten();
+        *kept(&self.pair.bounds[usize::from(from_reference)], compute)
     }
 
     /// Deviation of marked edges from those of the reference.
     pub fn features(&self) -> Option<&FeatureDeviation> {
         let reference = self.reference()?;
-        self.features.get_or_init(|| feature_deviation(self.mesh, reference.mesh)).as_ref()
+        kept(&self.pair.features, || feature_deviation(self.mesh, reference.mesh)).as_ref()
     }
 
     /// Inner vertices, and those among them whose valence is not 4.

@@ -5,6 +5,8 @@
 //! the file has it. A binary STL that would break one is written as text, which has all digits; another file is not
 //! written, and its output fails.
 
+use std::sync::Arc;
+
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
@@ -13,6 +15,7 @@ use super::job::Finished;
 use super::shared::Shared;
 use crate::format::{self, Format};
 use crate::mesh::{FaceId, Soup, VertexId};
+use crate::metric::Measured;
 use crate::metric::gate::{Check, GateReport, GateRow, bounds_distance};
 use crate::plan::{GateTask, Output, Task, TaskId};
 use crate::step::StepFailure;
@@ -85,7 +88,7 @@ struct Attempt {
     /// Checks that fail on the file.
     broken: Vec<String>,
     /// The mesh as the file has it, where that is another one than was written.
-    file: Option<Soup>,
+    file: Option<Measured>,
     /// Largest distance between a vertex and where the file has it; `None` where the faces of the file are others, as
     /// where a format cuts quads into triangles.
     moved: Option<f64>,
@@ -114,7 +117,7 @@ impl Attempt {
         made.lost = format::not_kept(soup, &after);
         made.groups = format::groups_not_kept(soup, &after);
         let Some(corners) = corners(soup, &after) else {
-            made.file = Some(after);
+            made.file = Some(Measured::new(Arc::new(after)));
             return made;
         };
         let largest = corners.iter().map(|&(vertex, at)| soup.points[vertex].distance(at)).fold(0.0, f64::max);
@@ -125,7 +128,7 @@ impl Attempt {
             for (vertex, at) in corners {
                 file.points[vertex] = at;
             }
-            made.file = Some(file);
+            made.file = Some(Measured::new(Arc::new(file)));
         }
         made
     }
@@ -148,8 +151,8 @@ impl Attempt {
             return Ok(());
         }
         let reference = shared.plan.inputs(id).into_iter().find(|(name, _)| *name == "reference");
-        let reference = reference.map(|(_, input)| shared.artifact(input)).transpose()?;
-        let work = || gate::judge_soup(&checks, file, reference.as_ref(), watch);
+        let reference = reference.map(|(_, input)| gate::mesh(shared, input)).transpose()?;
+        let work = || gate::evaluate(&checks, file, reference.as_ref(), watch);
         let report = shared.pool()?.install(work).map_err(Finished::Failed)?;
         let failed = report.rows.iter().filter(|row| !row.passed);
         self.broken.extend(failed.map(|row| {

@@ -2,36 +2,32 @@
 
 use std::sync::Arc;
 
-use crate::mesh::Soup;
-use crate::metric::gate::{Check, GateError, GateReport, evaluate as judge};
-use crate::plan::GateTask;
-use crate::step::{Artifact, StepFailure};
+use super::job::Finished;
+use super::shared::Shared;
+use crate::metric::gate::{Check, GateError, GateReport, judge};
+use crate::metric::{Measured, Subject};
+use crate::plan::TaskId;
+use crate::step::StepFailure;
 use crate::watch::{Cancelled, Watch};
 
 /// Judges a mesh, compared with `reference` where the checks ask for it.
 pub(super) fn evaluate(
-    task: &GateTask,
-    target: &Artifact,
-    reference: Option<&Artifact>,
-    watch: &Watch,
-) -> Result<GateReport, StepFailure> {
-    judge_soup(&task.checks, &*mesh(target)?, reference, watch)
-}
-
-/// Judges a mesh that is no artifact, as a file has it.
-pub(super) fn judge_soup(
     checks: &[Check],
-    target: &Soup,
-    reference: Option<&Artifact>,
+    target: &Measured,
+    reference: Option<&Arc<Measured>>,
     watch: &Watch,
 ) -> Result<GateReport, StepFailure> {
-    let reference = reference.map(mesh).transpose()?;
-    judge(target, reference.as_deref(), checks, watch).map_err(|error| match error {
+    judge(&Subject::kept(target, reference, watch), checks).map_err(|error| match error {
         GateError::Cancelled(_) => Cancelled.into(),
         other => StepFailure::failed(other.to_string()),
     })
 }
 
-fn mesh(artifact: &Artifact) -> Result<Arc<Soup>, StepFailure> {
-    artifact.to_soup().ok_or_else(|| StepFailure::failed(format!("a gate judges meshes, not {}", artifact.port())))
+/// The mesh of a task that a gate judges or compares with.
+pub(super) fn mesh(shared: &Shared<'_>, task: TaskId) -> Result<Arc<Measured>, Finished> {
+    if let Some(mesh) = shared.measured(task)? {
+        return Ok(mesh);
+    }
+    let what = shared.artifact(task)?.port();
+    Err(Finished::Failed(StepFailure::failed(format!("a gate judges meshes, not {what}"))))
 }

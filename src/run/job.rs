@@ -11,7 +11,7 @@ use super::observe::{Event, Observer};
 use super::shared::{NoArtifact, Shared, VERSION, recipe_task};
 use super::{FileState, RunError, gate, output};
 use crate::plan::{ContentHash, GateTask, Record, StepTask, Task, TaskId};
-use crate::step::{FailureKind, Inputs, StepFailure};
+use crate::step::{FailureKind, Inputs, OutPort, Port, StepFailure};
 use crate::store::{Entry, Outcome};
 use crate::watch::{Progress, Watch};
 
@@ -132,6 +132,15 @@ fn step_task(
         artifacts.push((name, shared.artifact(input)?));
     }
     let inputs = Inputs::new(artifacts);
+    // Who gives a table of metrics measures its inputs, as gates do.
+    let measures = step.def.output(step.output).is_some_and(|output| output.port == OutPort::Is(Port::Metrics));
+    let mut measured = Vec::new();
+    for (name, input) in shared.plan.inputs(id).into_iter().filter(|_| measures) {
+        measured.extend(shared.measured(input)?.map(|mesh| (name, mesh)));
+    }
+    let first = measured.first().map(|(_, mesh)| Arc::clone(mesh));
+    let _turn = first.as_ref().map(|mesh| mesh.turn());
+    let inputs = inputs.with_measured(measured);
     shared.needs().check(shared.plan, id, &inputs).map_err(Finished::Failed)?;
     let work = || catch_unwind(AssertUnwindSafe(|| step.run(&inputs, watch)));
     let produced = shared.pool()?.install(work).unwrap_or_else(|payload| Err(panicked(payload.as_ref())));
@@ -153,15 +162,17 @@ fn gate_task(
 ) -> Result<(Outcome, serde_json::Value), Finished> {
     let (mut target, mut reference) = (None, None);
     for (name, input) in shared.plan.inputs(id) {
-        let artifact = shared.artifact(input)?;
+        let mesh = gate::mesh(shared, input)?;
         if name == "target" {
-            target = Some(artifact);
+            target = Some(mesh);
         } else {
-            reference = Some(artifact);
+            reference = Some(mesh);
         }
     }
     let target = target.ok_or_else(|| Finished::Failed(StepFailure::failed("the gate has no mesh to check")))?;
-    let work = || catch_unwind(AssertUnwindSafe(|| gate::evaluate(task, &target, reference.as_ref(), watch)));
+    let _turn = target.turn();
+    let work = || gate::evaluate(&task.checks, &target, reference.as_ref(), watch);
+    let work = || catch_unwind(AssertUnwindSafe(work));
     let report = shared.pool()?.install(work).unwrap_or_else(|payload| Err(panicked(payload.as_ref())));
     let report = report.map_err(Finished::Failed)?;
     let json = serde_json::to_value(&report).unwrap_or_default();

@@ -5,6 +5,7 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use super::names::Needs;
 use super::{RunError, RunOptions, source};
+use crate::metric::Measured;
 use crate::metric::gate::GateReport;
 use crate::plan::{ContentHash, Key, Plan, Record, Task, TaskId, task_key, task_record};
 use crate::step::{Artifact, FileBytes, StepFailure};
@@ -24,11 +25,17 @@ pub(super) struct Shared<'a> {
     pub(super) index: StatIndex,
     pub(super) options: &'a RunOptions,
     contents: Vec<OnceLock<ContentHash>>,
-    slots: Vec<Mutex<Option<Artifact>>>,
+    slots: Vec<Mutex<Option<Slot>>>,
     reports: Vec<OnceLock<GateReport>>,
     pool: OnceLock<Arc<rayon::ThreadPool>>,
     unsaved: OnceLock<StoreError>,
     needs: OnceLock<Needs>,
+}
+
+/// An artifact that is alive, and what was measured of it.
+struct Slot {
+    artifact: Artifact,
+    measured: Option<Arc<Measured>>,
 }
 
 /// Why an artifact cannot be had.
@@ -116,17 +123,30 @@ impl<'a> Shared<'a> {
 
     /// The artifact of a task that is cached or done. Readers of one artifact share it; the first one loads it.
     pub(super) fn artifact(&self, task: TaskId) -> Result<Artifact, NoArtifact> {
+        self.with_slot(task, |slot| slot.artifact.clone())
+    }
+
+    /// The mesh of a task, which keeps what its readers measure of it; `None` where it gives no mesh.
+    pub(super) fn measured(&self, task: TaskId) -> Result<Option<Arc<Measured>>, NoArtifact> {
+        self.with_slot(task, |slot| {
+            if slot.measured.is_none() {
+                slot.measured = slot.artifact.to_soup().map(|mesh| Arc::new(Measured::new(mesh)));
+            }
+            slot.measured.clone()
+        })
+    }
+
+    fn with_slot<T>(&self, task: TaskId, read: impl FnOnce(&mut Slot) -> T) -> Result<T, NoArtifact> {
         let mut slot = self.slots[task.index()].lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(artifact) = &*slot {
-            return Ok(artifact.clone());
+        if let Some(slot) = &mut *slot {
+            return Ok(read(slot));
         }
         let content = self.content(task).ok_or(NoArtifact::Lost(task))?;
         let artifact = match &self.plan.node(task).task {
             Task::Source(source) => self.source(&source.path, content).map_err(NoArtifact::Failed)?,
             Task::Step(_) | Task::Gate(_) => self.store.load(&content).ok_or(NoArtifact::Lost(task))?,
         };
-        *slot = Some(artifact.clone());
-        Ok(artifact)
+        Ok(read(slot.insert(Slot { artifact, measured: None })))
     }
 
     fn source(&self, path: &Path, content: ContentHash) -> Result<Artifact, StepFailure> {
@@ -141,7 +161,8 @@ impl<'a> Shared<'a> {
 
     /// Keeps an artifact for its readers.
     pub(super) fn keep(&self, task: TaskId, artifact: Artifact) {
-        *self.slots[task.index()].lock().unwrap_or_else(PoisonError::into_inner) = Some(artifact);
+        *self.slots[task.index()].lock().unwrap_or_else(PoisonError::into_inner) =
+            Some(Slot { artifact, measured: None });
     }
 
     /// Drops an artifact after its last reader.

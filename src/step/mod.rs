@@ -24,6 +24,7 @@ pub use locks::{Boundary, Locks};
 pub use resolution::Resolution;
 pub use sizing::ResolvedSizing;
 
+use crate::metric::Measured;
 use crate::watch::Watch;
 
 /// A named input of a step: a recipe key that names another step, or for [`Port::File`] a file.
@@ -66,12 +67,25 @@ pub enum OutPort {
 #[derive(Clone, Debug, Default)]
 pub struct Inputs {
     artifacts: Vec<(&'static str, Artifact)>,
+    measured: Vec<(&'static str, Arc<Measured>)>,
 }
 
 impl Inputs {
     /// Inputs from pairs of name and artifact.
     pub fn new(artifacts: Vec<(&'static str, Artifact)>) -> Self {
-        Self { artifacts }
+        Self { artifacts, measured: Vec::new() }
+    }
+
+    /// The same, with what others keep of these inputs.
+    #[must_use]
+    pub fn with_measured(self, measured: Vec<(&'static str, Arc<Measured>)>) -> Self {
+        Self { measured, ..self }
+    }
+
+    /// The mesh of this input, with what is known of it; `None` where the input is no mesh or is not there.
+    pub fn measured(&self, name: &str) -> Option<Arc<Measured>> {
+        let known = self.measured.iter().find(|(n, _)| *n == name).map(|(_, measured)| Arc::clone(measured));
+        known.or_else(|| Some(Arc::new(Measured::new(self.get(name)?.to_soup()?))))
     }
 
     /// The artifact of this name, where the recipe gave one.

@@ -19,7 +19,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::mesh::Soup;
-use crate::metric::{self, Measurement};
+use crate::metric::{self, Measurement, Subject};
 use crate::step::{
     Artifact, InputDef, Inputs, Locks, OutPort, OutputDef, Port, Produced, Step as StepContract, StepFailure,
 };
@@ -65,7 +65,11 @@ pub fn measure(
     _params: &MeasureParams,
     watch: &Watch,
 ) -> Result<(Measurement, MeasureStats), MeasureError> {
-    let table = metric::measure(mesh, reference, watch)?;
+    of(&Subject::new(mesh, reference, watch))
+}
+
+fn of(subject: &Subject<'_>) -> Result<(Measurement, MeasureStats), MeasureError> {
+    let table = metric::measure_kept(subject)?;
     let stats = MeasureStats { metrics: table.values.len() };
     Ok((table, stats))
 }
@@ -100,16 +104,19 @@ impl StepContract for Step {
     fn run(
         inputs: &Inputs,
         _output: &str,
-        params: &MeasureParams,
+        _params: &MeasureParams,
         _locks: &Locks,
         watch: &Watch,
     ) -> Result<Produced<MeasureStats>, StepFailure> {
-        let mesh = inputs.require("from")?.to_soup().ok_or(MeasureError::NotAMesh("from"))?;
-        let reference = inputs
-            .get("reference")
-            .map(|artifact| artifact.to_soup().ok_or(MeasureError::NotAMesh("reference")))
-            .transpose()?;
-        let (table, stats) = measure(&mesh, reference.as_deref(), params, watch)?;
+        inputs.require("from")?;
+        let mesh = inputs.measured("from").ok_or(MeasureError::NotAMesh("from"))?;
+        let reference = inputs.measured("reference");
+        if reference.is_none() && inputs.get("reference").is_some() {
+            return Err(MeasureError::NotAMesh("reference").into());
+        }
+        let table =
+            metric::measure_kept(&Subject::kept(&mesh, reference.as_ref(), watch)).map_err(MeasureError::from)?;
+        let stats = MeasureStats { metrics: table.values.len() };
         Ok(Produced { artifact: Artifact::Metrics(Arc::new(table)), stats })
     }
 }

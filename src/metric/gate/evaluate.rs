@@ -1,7 +1,7 @@
 //! Judging a mesh by the checks of a gate.
 
 use super::super::crossing::compare;
-use super::super::distance::{Decision, Target, decide, upper_bound};
+use super::super::distance::{Decision, decide};
 use super::super::number::number_text;
 use super::super::registry::{MetricDef, Needs, Unit, find, lost_groups};
 use super::super::{Subject, Value};
@@ -73,21 +73,25 @@ pub fn evaluate(
     checks: &[Check],
     watch: &Watch,
 ) -> Result<GateReport, GateError> {
-    let subject = Subject::new(mesh, reference, watch);
+    judge(&Subject::new(mesh, reference, watch), checks)
+}
+
+/// The same of a subject, of which some may be known.
+pub fn judge(subject: &Subject<'_>, checks: &[Check]) -> Result<GateReport, GateError> {
     let mut report = GateReport::default();
     for check in checks {
         let metric = find(&check.metric).ok_or_else(|| GateError::UnknownMetric(check.metric.clone()))?;
         let compares = metric.needs == Needs::Reference || check.same_as_reference || check.no_more_than_reference;
-        if compares && reference.is_none() {
+        if compares && subject.reference().is_none() {
             return Err(GateError::NoReference(check.metric.clone()));
         }
-        report.rows.push(judge(&subject, metric, check)?);
-        watch.check().map_err(GateError::Cancelled)?;
+        report.rows.push(judge_one(subject, metric, check)?);
+        subject.watch().check().map_err(GateError::Cancelled)?;
     }
     Ok(report)
 }
 
-fn judge(subject: &Subject<'_>, metric: &MetricDef, check: &Check) -> Result<GateRow, GateError> {
+fn judge_one(subject: &Subject<'_>, metric: &MetricDef, check: &Check) -> Result<GateRow, GateError> {
     let bounds = resolve(subject, metric, check);
     if let (Some(at_most), None, None) = (bounds.at_most, bounds.at_least, bounds.equals)
         && let Some(sides) = sides(metric.name)
@@ -325,15 +329,11 @@ pub fn judges_faces(check: &Check) -> bool {
 }
 
 /// The certified upper bound of the distance on all sides that count; `None` where one of the meshes has no face.
-fn closest_bound(sides: [bool; 2], mesh: &Target, theirs: &Target, watch: &Watch) -> Result<Option<f64>, Cancelled> {
-    let mut bound = 0.0_f64;
-    for (wanted, from, to) in [(sides[0], mesh, theirs), (sides[1], theirs, mesh)] {
-        if wanted {
-            let Some(upper) = upper_bound(from, to, watch)? else { return Ok(None) };
-            bound = bound.max(upper);
-        }
-    }
-    Ok(Some(bound))
+fn closest_bound(sides: [bool; 2], subject: &Subject<'_>) -> Option<f64> {
+    let wanted = [false, true].into_iter().zip(sides).filter(|(_, wanted)| *wanted);
+    wanted
+        .map(|(from_reference, _)| subject.bound(from_reference))
+        .try_fold(0.0, |most: f64, bound| Some(most.max(bound?)))
 }
 
 /// A distance that passes is bounded closely, so that the figures of a study can be compared. Where that bound is not
@@ -350,7 +350,7 @@ fn judge_distance(
     let except = fault::members(subject.mesh(), &check.except);
     let (mesh, theirs) = (subject.target(), reference.target());
     if except.is_empty()
-        && let Some(bound) = closest_bound(sides, mesh, theirs, subject.watch())?.filter(|&bound| bound <= at_most)
+        && let Some(bound) = closest_bound(sides, subject).filter(|&bound| bound <= at_most)
     {
         out.passed = true;
         out.measured = Some(Value::Number(bound));
