@@ -73,6 +73,27 @@ def pymeshlab(task, source, target, number):
     return {}, cpu
 
 
+def mmg(task, source, target, number):
+    """MMG's surface remesher: 0.2 % of the diagonal off at most, edges of `number` at most, sharp from 30 degrees on."""
+    import mmgpy
+    import numpy
+    import pyvista
+
+    mesh = pyvista.read(source).clean(tolerance=0.0)
+    points, faces = numpy.asarray(mesh.points, dtype=float), numpy.asarray(mesh.regular_faces, dtype=numpy.int32)
+    made = mmgpy.MmgMeshS()
+
+    def remesh():
+        made.set_mesh_size(vertices=len(points), triangles=len(faces))
+        made.set_vertices(points)
+        made.set_triangles(faces)
+        made.remesh(hausd=0.002 * mesh.length, hmax=float(number), hgrad=1.3, angle=30, verbose=-1)
+
+    _, cpu = timed(remesh)
+    pyvista.PolyData.from_regular_faces(made.get_vertices(), made.get_triangles()).save(target)
+    return {}, cpu
+
+
 def fast_simplification(task, source, target, number):
     import fast_simplification
     import numpy
@@ -88,7 +109,7 @@ def fast_simplification(task, source, target, number):
 
 def main():
     peer, task, source, target, number = (sys.argv[1:] + [""])[:5]
-    facts, cpu = {"open3d": open3d, "pymeshlab": pymeshlab, "fast-simplification": fast_simplification}[peer](
+    facts, cpu = {"open3d": open3d, "pymeshlab": pymeshlab, "mmg": mmg, "fast-simplification": fast_simplification}[peer](
         task, source, target, number)
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024
     print(json.dumps({"cpu": cpu, "peak": peak, **facts}))
