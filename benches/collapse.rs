@@ -10,9 +10,9 @@ use std::hint::black_box;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use meshmill::mesh::{LockRules, Surface};
+use meshmill::metric::ToleranceMode;
 use meshmill::step::Length;
 use meshmill::steps::control_properties::{ControlPropertiesInput, ControlPropertiesParams, control_properties};
-use meshmill::technique::guarded::ToleranceMode;
 use meshmill::watch::Watch;
 
 fn params(mode: ToleranceMode, optimize: bool, target: usize) -> ControlPropertiesParams {

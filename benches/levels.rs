@@ -5,9 +5,9 @@ mod shapes;
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use meshmill::mesh::{Hierarchy, LockRules, Surface};
+use meshmill::metric::ToleranceMode;
 use meshmill::step::Length;
 use meshmill::steps::control_properties::{ControlPropertiesInput, ControlPropertiesParams, record_properties};
-use meshmill::technique::guarded::ToleranceMode;
 use meshmill::technique::hierarchy::{Density, Front, curvature_thresholds, extract};
 use meshmill::watch::Watch;
 

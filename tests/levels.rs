@@ -6,6 +6,7 @@ use meshmill::mesh::hierarchy::NodeId;
 use meshmill::mesh::topology::EdgeTable;
 use meshmill::mesh::validate::validate_surface;
 use meshmill::mesh::{Carried, Field, Hierarchy, LockRules, Soup, Support, Surface, VertexId};
+use meshmill::metric::ToleranceMode;
 use meshmill::step::{Length, Resolution, Share};
 use meshmill::steps::adapt_curvature::{AdaptCurvatureParams, adapt_curvature};
 use meshmill::steps::adapt_density::{AdaptDensityError, AdaptDensityParams, adapt_density};
@@ -15,7 +16,6 @@ use meshmill::steps::control_properties::{
 };
 use meshmill::steps::improve_quality::{ImproveQualityInput, ImproveQualityParams, record_quality};
 use meshmill::steps::resolution::{ResolutionError, ResolutionParams, resolution};
-use meshmill::technique::guarded::ToleranceMode;
 use meshmill::technique::hierarchy::{Front, extract};
 use meshmill::watch::Watch;
 

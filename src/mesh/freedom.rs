@@ -37,6 +37,13 @@ pub struct LockRules<'a> {
     pub rim: Rim,
 }
 
+impl LockRules<'_> {
+    /// Whether elements are locked by name, which then stay whatever else they are.
+    pub fn name_elements(&self) -> bool {
+        !(self.keep.is_empty() && self.only.is_empty())
+    }
+}
+
 /// Why locks cannot be resolved.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum FreedomError {

@@ -13,6 +13,7 @@ pub mod registry;
 pub mod shape;
 pub mod subject;
 pub mod summary;
+pub mod tolerance;
 pub mod topology;
 pub mod weld;
 
@@ -23,6 +24,7 @@ use serde::{Deserialize, Serialize};
 pub use measured::Measured;
 use registry::{METRICS, Needs};
 pub use subject::Subject;
+pub use tolerance::ToleranceMode;
 
 use crate::mesh::Soup;
 use crate::watch::{Cancelled, Watch};

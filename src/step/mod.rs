@@ -10,6 +10,7 @@ pub mod locks;
 pub mod parameters;
 pub mod resolution;
 pub mod sizing;
+pub mod tolerance;
 
 use std::sync::Arc;
 
@@ -23,6 +24,7 @@ pub use length::{Angle, Length, Share, Sizing};
 pub use locks::{Boundary, Locks};
 pub use resolution::Resolution;
 pub use sizing::ResolvedSizing;
+pub use tolerance::{OutOfRange, REFERENCE, ResolvedTolerance, Tolerance, ToleranceError};
 
 use crate::metric::Measured;
 use crate::watch::Watch;

@@ -27,12 +27,14 @@ use serde::{Deserialize, Serialize};
 use crate::mesh::halfedge::EnterError;
 use crate::mesh::transfer::inherit_fields;
 use crate::mesh::{FreedomError, Hierarchy, IdVec, LockRules, Surface, resolve_freedom};
+use crate::metric::ToleranceMode;
 use crate::step::{
-    Artifact, InputDef, Inputs, Length, Locks, OutPort, OutputDef, Port, Produced, ResolvedSizing, Sizing, StepFailure,
+    Artifact, InputDef, Inputs, Length, Locks, OutPort, OutputDef, Port, Produced, REFERENCE, ResolvedSizing, Sizing,
+    StepFailure, Tolerance, ToleranceError,
 };
 use crate::technique::collapse::{CollapseRules, Ending, Goal, Order, Priority, simplify};
 use crate::technique::guarded::{
-    Counts, GuardedMesh, Limits, Setup, SizeField, StarRules, ToleranceMode, diagonal, open, recount, reference_tree,
+    Counts, GuardedMesh, Limits, Setup, SizeField, StarRules, diagonal, open, recount, reference_tree,
 };
 use crate::technique::hierarchy::{Front, extract};
 use crate::technique::levels::{HierarchyReport, Recorded, Source, build};
@@ -91,6 +93,17 @@ impl Default for ImproveQualityParams {
     }
 }
 
+impl ImproveQualityParams {
+    fn tolerance(&self) -> Tolerance {
+        Tolerance {
+            mode: self.tolerance_mode,
+            tolerance: self.tolerance,
+            feature_tolerance: self.feature_tolerance,
+            feature_weight: self.feature_weight,
+        }
+    }
+}
+
 /// What quality improvement did. Shape and size are counted on the result.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
@@ -103,18 +116,9 @@ pub struct ImproveQualityStats {
     pub faces_refined: usize,
     /// Faces of the result.
     pub faces_after: usize,
-    /// Edges collapsed.
-    pub collapses: usize,
-    /// Edges flipped.
-    pub flips: usize,
-    /// Edges split after refinement.
-    pub splits: usize,
-    /// Vertices moved.
-    pub moves: usize,
-    /// Edits refused because the surface would have left the tolerance.
-    pub refused_by_tolerance: usize,
-    /// Edits refused because faces would have intersected.
-    pub refused_by_intersection: usize,
+    /// What was done after refinement, and what was refused.
+    #[serde(flatten)]
+    pub counts: Counts,
     /// Least stretch before.
     pub min_stretch_before: f64,
     /// Mean stretch before.
@@ -142,19 +146,9 @@ pub struct ImproveQualityStats {
 /// Why quality improvement refused.
 #[derive(Debug, thiserror::Error)]
 pub enum ImproveQualityError {
-    /// The tolerance has no meaning in this mode.
-    #[error("in `quadric-sum` mode `tolerance` is a squared length: a number, not a percent")]
-    PercentOfSquare,
-    /// A parameter is out of range.
-    #[error("{name} must be {range}, got {value}")]
-    OutOfRange {
-        /// The parameter.
-        name: &'static str,
-        /// What it may be.
-        range: &'static str,
-        /// What it is.
-        value: f64,
-    },
+    /// The tolerance makes no sense.
+    #[error(transparent)]
+    Tolerance(#[from] ToleranceError),
     /// A size names a field or group that is not there.
     #[error("max-edge: {0}")]
     Size(StepFailure),
@@ -271,18 +265,12 @@ fn stats(
 ) -> Result<ImproveQualityStats, ImproveQualityError> {
     let before = recount(input.surface, &resolve_freedom(input.surface, &input.locks)?, &setup.limits);
     let after = recount(result, &resolve_freedom(result, &input.locks)?, &setup.limits);
-    let counts = end.counts;
     Ok(ImproveQualityStats {
         target_reached: end.target_reached,
         faces_before: input.surface.faces.len(),
         faces_refined: end.faces_refined,
         faces_after: result.faces.len(),
-        collapses: counts.collapses,
-        flips: counts.flips,
-        splits: counts.splits,
-        moves: counts.moves,
-        refused_by_tolerance: counts.beyond_tolerance,
-        refused_by_intersection: counts.collisions,
+        counts: end.counts,
         min_stretch_before: before.min_stretch,
         mean_stretch_before: before.mean_stretch,
         min_stretch: after.min_stretch,
@@ -296,10 +284,9 @@ fn stats(
 }
 
 fn rules(params: &ImproveQualityParams) -> CollapseRules {
-    let is_certified = params.tolerance_mode == ToleranceMode::Distance;
     CollapseRules {
         star: StarRules { min_stretch: FLOOR, ..StarRules::default() },
-        order: if is_certified { Order::OnSurface } else { Order::Printed },
+        order: Order::of(params.tolerance_mode),
         priority: Priority::QualityGain,
     }
 }
@@ -340,17 +327,7 @@ fn setup(
     sizing: Option<ResolvedSizing>,
     diagonal: f64,
 ) -> Result<Setup, ImproveQualityError> {
-    let tolerance = match (params.tolerance_mode, params.tolerance) {
-        (ToleranceMode::QuadricSum, Length::Percent(_)) => return Err(ImproveQualityError::PercentOfSquare),
-        (_, length) => length.resolve(diagonal),
-    };
-    let out_of_range = |name, range, value| ImproveQualityError::OutOfRange { name, range, value };
-    if !(params.feature_weight >= 0.0 && params.feature_weight.is_finite()) {
-        return Err(out_of_range("feature-weight", "finite and not negative", params.feature_weight));
-    }
-    if tolerance <= 0.0 && params.tolerance_mode == ToleranceMode::Distance {
-        return Err(out_of_range("tolerance", "above 0", tolerance));
-    }
+    let tolerance = params.tolerance().resolve(diagonal)?;
     let max_size = match sizing {
         Some(ResolvedSizing::Uniform(length)) if params.target_faces.is_none() => SizeField::Uniform(length),
         Some(ResolvedSizing::Corners(values)) if params.target_faces.is_none() => {
@@ -359,13 +336,13 @@ fn setup(
         None | Some(_) => SizeField::Uniform(f64::INFINITY),
     };
     Ok(Setup {
-        mode: params.tolerance_mode,
-        tolerance,
-        feature_tolerance: params.feature_tolerance.map_or(0.5 * tolerance, |length| length.resolve(diagonal)),
-        feature_weight: params.feature_weight,
+        mode: tolerance.mode,
+        tolerance: tolerance.tolerance,
+        feature_tolerance: tolerance.feature_tolerance,
+        feature_weight: tolerance.feature_weight,
         // Quality improvement has no valence limit of its own; this one keeps fans of hundreds of faces away.
         limits: Limits { min_stretch: FLOOR, max_size, max_valence: 12 },
-        may_merge_corners: input.locks.keep.is_empty() && input.locks.only.is_empty(),
+        may_merge_corners: !input.locks.name_elements(),
     })
 }
 
@@ -375,16 +352,13 @@ impl From<ImproveQualityError> for StepFailure {
         match error {
             ImproveQualityError::Cancelled(cancelled)
             | ImproveQualityError::Refine(RefineError::Cancelled(cancelled)) => cancelled.into(),
-            ImproveQualityError::PercentOfSquare => Self::failed(message)
-                .with_help("give a number in squared mesh units, or use `tolerance-mode = \"quadric-rms\"`"),
+            ImproveQualityError::Tolerance(error) => error.into(),
             ImproveQualityError::Size(failure) => Self { message, ..failure },
             ImproveQualityError::NotASurface(_) => Self::bad_input(message).with_help("run `repair` first"),
             ImproveQualityError::Refine(RefineError::TooManyFaces { .. }) => {
                 Self::failed(message).with_help("give a larger `max-edge`, or a larger `max-faces` if that is meant")
             }
-            ImproveQualityError::Refine(_) | ImproveQualityError::OutOfRange { .. } | ImproveQualityError::Locks(_) => {
-                Self::failed(message)
-            }
+            ImproveQualityError::Refine(_) | ImproveQualityError::Locks(_) => Self::failed(message),
         }
     }
 }
@@ -404,12 +378,7 @@ impl crate::step::Step for Step {
     const REVISION: u32 = 17;
     const INPUTS: &'static [InputDef] = &[
         InputDef { name: "from", accepts: &[Port::Surface], required: true, doc: "the surface to improve" },
-        InputDef {
-            name: "reference",
-            accepts: &[Port::Surface],
-            required: false,
-            doc: "what the tolerance is measured against; default: `from`",
-        },
+        REFERENCE,
     ];
     const OUTPUTS: &'static [OutputDef] = &[
         OutputDef { name: "main", port: OutPort::Is(Port::Surface), derive: None },

@@ -38,13 +38,13 @@ use serde::{Deserialize, Serialize};
 use crate::mesh::geometry::triangle_area;
 use crate::mesh::transfer::inherit_fields;
 use crate::mesh::{FaceId, Hierarchy, LockRules, Surface, resolve_freedom};
+use crate::metric::ToleranceMode;
 use crate::step::{
-    Artifact, InputDef, Inputs, Length, Locks, OutPort, OutputDef, Port, Produced, ResolvedSizing, Sizing, StepFailure,
+    Artifact, InputDef, Inputs, Length, Locks, OutOfRange, OutPort, OutputDef, Port, Produced, REFERENCE,
+    ResolvedSizing, Sizing, StepFailure, Tolerance,
 };
 use crate::technique::collapse::{CollapseRules, Ending, Goal, Order, Priority, simplify};
-use crate::technique::guarded::{
-    GuardedMesh, Limits, Setup, SizeField, StarRules, ToleranceMode, diagonal, open, reference_tree,
-};
+use crate::technique::guarded::{GuardedMesh, Limits, Setup, SizeField, StarRules, diagonal, open, reference_tree};
 use crate::technique::hierarchy::{Front, extract};
 use crate::technique::levels::{HierarchyReport, Recorded, Source, build};
 use crate::technique::refine::MAX_FACES;
@@ -123,6 +123,17 @@ impl Default for ControlPropertiesParams {
             feature_weight: 100.0,
             optimize: None,
             on_infeasible: OnInfeasible::Report,
+        }
+    }
+}
+
+impl ControlPropertiesParams {
+    fn tolerance(&self) -> Tolerance {
+        Tolerance {
+            mode: self.tolerance_mode,
+            tolerance: self.tolerance,
+            feature_tolerance: self.feature_tolerance,
+            feature_weight: self.feature_weight,
         }
     }
 }
@@ -215,10 +226,9 @@ pub fn record_properties(
 }
 
 fn rules(params: &ControlPropertiesParams) -> CollapseRules {
-    let is_certified = params.tolerance_mode == ToleranceMode::Distance;
     CollapseRules {
         star: StarRules { min_stretch: params.min_stretch, ..StarRules::default() },
-        order: if is_certified { Order::OnSurface } else { Order::Printed },
+        order: Order::of(params.tolerance_mode),
         priority: Priority::SmallFirst { size: 1.0 },
     }
 }
@@ -247,34 +257,20 @@ fn setup(
     params: &ControlPropertiesParams,
     diagonal: f64,
 ) -> Result<Setup, ControlPropertiesError> {
-    let tolerance = match (params.tolerance_mode, params.tolerance) {
-        (ToleranceMode::QuadricSum, Length::Percent(_)) => return Err(ControlPropertiesError::PercentOfSquare),
-        (_, length) => length.resolve(diagonal),
-    };
-    let check = |name, range, value: f64, holds: bool| {
-        if holds { Ok(()) } else { Err(ControlPropertiesError::OutOfRange { name, range, value }) }
-    };
-    check("min-stretch", "from 0 to 0.95", params.min_stretch, (0.0..=0.95).contains(&params.min_stretch))?;
-    check("mean-stretch", "from 0 to 0.95", params.mean_stretch, (0.0..=0.95).contains(&params.mean_stretch))?;
-    check("max-valence", "at least 6", params.max_valence as f64, params.max_valence >= 6)?;
-    check(
-        "feature-weight",
-        "finite and not negative",
-        params.feature_weight,
-        params.feature_weight >= 0.0 && params.feature_weight.is_finite(),
-    )?;
-    let is_length = params.tolerance_mode == ToleranceMode::Distance;
-    check("tolerance", "above 0", tolerance, tolerance > 0.0 || !is_length)?;
-    let feature_tolerance = params.feature_tolerance.map_or(0.5 * tolerance, |length| length.resolve(diagonal));
+    for (name, value) in [("min-stretch", params.min_stretch), ("mean-stretch", params.mean_stretch)] {
+        OutOfRange::unless((0.0..=0.95).contains(&value), name, "from 0 to 0.95", value)?;
+    }
+    OutOfRange::unless(params.max_valence >= 6, "max-valence", "at least 6", params.max_valence as f64)?;
+    let tolerance = params.tolerance().resolve(diagonal)?;
     let max_size = max_size(input.surface, params, diagonal)?;
     let limits = Limits { min_stretch: params.min_stretch, max_size, max_valence: params.max_valence };
     Ok(Setup {
-        mode: params.tolerance_mode,
-        tolerance,
-        feature_tolerance,
-        feature_weight: params.feature_weight,
+        mode: tolerance.mode,
+        tolerance: tolerance.tolerance,
+        feature_tolerance: tolerance.feature_tolerance,
+        feature_weight: tolerance.feature_weight,
         limits,
-        may_merge_corners: input.locks.keep.is_empty() && input.locks.only.is_empty(),
+        may_merge_corners: !input.locks.name_elements(),
     })
 }
 
@@ -287,9 +283,7 @@ fn max_size(
     let Some(sizing) = &params.max_size else { return Ok(SizeField::Uniform(f64::INFINITY)) };
     let sizes = sizing.resolve(surface, diagonal).map_err(ControlPropertiesError::Size)?;
     let least = sizes.least();
-    if least.is_nan() || least <= 0.0 {
-        return Err(ControlPropertiesError::OutOfRange { name: "max-size", range: "above 0", value: least });
-    }
+    OutOfRange::unless(least > 0.0, "max-size", "above 0", least)?;
     let size_of = |f: FaceId| match &sizes {
         ResolvedSizing::Uniform(length) => *length,
         ResolvedSizing::Corners(values) => values[f.index()].into_iter().sum::<f64>() / 3.0,
@@ -322,12 +316,7 @@ impl crate::step::Step for Step {
     const REVISION: u32 = 18;
     const INPUTS: &'static [InputDef] = &[
         InputDef { name: "from", accepts: &[Port::Surface], required: true, doc: "the surface to simplify" },
-        InputDef {
-            name: "reference",
-            accepts: &[Port::Surface],
-            required: false,
-            doc: "what the tolerance is measured against; default: `from`",
-        },
+        REFERENCE,
     ];
     const OUTPUTS: &'static [OutputDef] = &[
         OutputDef { name: "main", port: OutPort::Is(Port::Surface), derive: None },

@@ -6,7 +6,7 @@ use serde::Serialize;
 use super::{ControlPropertiesInput, ControlPropertiesParams};
 use crate::mesh::halfedge::EnterError;
 use crate::mesh::{FreedomError, Surface, resolve_freedom};
-use crate::step::StepFailure;
+use crate::step::{OutOfRange, StepFailure, ToleranceError};
 use crate::technique::collapse::Ending;
 use crate::technique::guarded::{Cause, Counts, Recount, Setup, Threshold, Violation, recount};
 use crate::technique::levels::HierarchyReport;
@@ -35,18 +35,9 @@ pub struct ControlPropertiesStats {
     pub faces_before: usize,
     /// Faces of the result.
     pub faces_after: usize,
-    /// Edges collapsed.
-    pub collapses: usize,
-    /// Edges flipped.
-    pub flips: usize,
-    /// Edges split.
-    pub splits: usize,
-    /// Vertices moved.
-    pub moves: usize,
-    /// Edits refused because the surface would have left the tolerance.
-    pub refused_by_tolerance: usize,
-    /// Edits refused because faces would have intersected.
-    pub refused_by_intersection: usize,
+    /// What was done, and what was refused.
+    #[serde(flatten)]
+    pub counts: Counts,
     /// Least stretch.
     pub min_stretch: f64,
     /// Mean stretch.
@@ -81,19 +72,12 @@ pub struct ControlPropertiesStats {
 /// Why property control refused.
 #[derive(Debug, thiserror::Error)]
 pub enum ControlPropertiesError {
-    /// The tolerance has no meaning in this mode.
-    #[error("in `quadric-sum` mode `tolerance` is a squared length: a number, not a percent")]
-    PercentOfSquare,
+    /// The tolerance makes no sense.
+    #[error(transparent)]
+    Tolerance(#[from] ToleranceError),
     /// A threshold is out of range.
-    #[error("{name} must be {range}, got {value}")]
-    OutOfRange {
-        /// The parameter.
-        name: &'static str,
-        /// What it may be.
-        range: &'static str,
-        /// What it is.
-        value: f64,
-    },
+    #[error(transparent)]
+    OutOfRange(#[from] OutOfRange),
     /// `max-size` asks for more faces than `max-faces` allows.
     #[error("`max-size` asks for at least {least:.3e} faces, above `max-faces` = {most}")]
     TooManyFaces {
@@ -187,17 +171,11 @@ pub(super) fn stats(
 ) -> Result<ControlPropertiesStats, ControlPropertiesError> {
     let freedom = resolve_freedom(result, &input.locks)?;
     let recount = recount(result, &freedom, &setup.limits);
-    let counts = end.counts;
     Ok(ControlPropertiesStats {
         status: status(&recount, end.ending, params),
         faces_before: input.surface.faces.len(),
         faces_after: result.faces.len(),
-        collapses: counts.collapses,
-        flips: counts.flips,
-        splits: counts.splits,
-        moves: counts.moves,
-        refused_by_tolerance: counts.beyond_tolerance,
-        refused_by_intersection: counts.collisions,
+        counts: end.counts,
         min_stretch: recount.min_stretch,
         mean_stretch: recount.mean_stretch,
         mean_stretch_off_curves: recount.free_mean_stretch,
@@ -227,8 +205,7 @@ impl From<ControlPropertiesError> for StepFailure {
         let message = error.to_string();
         match error {
             ControlPropertiesError::Cancelled(cancelled) => cancelled.into(),
-            ControlPropertiesError::PercentOfSquare => Self::failed(message)
-                .with_help("give a number in squared mesh units, or use `tolerance-mode = \"quadric-rms\"`"),
+            ControlPropertiesError::Tolerance(error) => error.into(),
             ControlPropertiesError::Size(failure) => Self { message, ..failure },
             ControlPropertiesError::Infeasible { .. } | ControlPropertiesError::MeanStretch { .. } => {
                 Self::failed(message).with_help(
@@ -239,7 +216,7 @@ impl From<ControlPropertiesError> for StepFailure {
                 Self::failed(message).with_help("raise `max-size`, or `max-faces` if that is meant")
             }
             ControlPropertiesError::NotASurface(_) => Self::bad_input(message).with_help("run `repair` first"),
-            ControlPropertiesError::OutOfRange { .. } | ControlPropertiesError::Locks(_) => Self::failed(message),
+            ControlPropertiesError::OutOfRange(_) | ControlPropertiesError::Locks(_) => Self::failed(message),
         }
     }
 }

@@ -50,12 +50,14 @@ use serde::{Deserialize, Serialize};
 use crate::mesh::halfedge::EnterError;
 use crate::mesh::transfer::inherit_fields;
 use crate::mesh::{FreedomError, LockRules, Surface, VertexId, resolve_freedom};
+use crate::metric::ToleranceMode;
 use crate::step::{
-    Angle, Artifact, InputDef, Inputs, Length, Locks, OutPort, OutputDef, Port, Produced, Share, StepFailure,
+    Angle, Artifact, InputDef, Inputs, Length, Locks, OutOfRange, OutPort, OutputDef, Port, Produced, REFERENCE, Share,
+    StepFailure, Tolerance, ToleranceError,
 };
 use crate::technique::dispersion::Dispersion;
 use crate::technique::fit::regions::{Wanted, fit_regions};
-use crate::technique::guarded::{GuardedMesh, Limits, Setup, SizeField, ToleranceMode, diagonal, open, reference_tree};
+use crate::technique::guarded::{GuardedMesh, Limits, Setup, SizeField, diagonal, open, reference_tree};
 use crate::technique::remesh::Refusals;
 use crate::watch::{Cancelled, Watch};
 
@@ -172,6 +174,15 @@ impl Default for SimplifyFitParams {
 }
 
 impl SimplifyFitParams {
+    fn tolerance(&self) -> Tolerance {
+        let mode = match self.tolerance_mode {
+            FitTolerance::Distance => ToleranceMode::Distance,
+            FitTolerance::Plane => ToleranceMode::QuadricRms,
+        };
+        let feature_tolerance = Some(self.feature_tolerance.unwrap_or(self.tolerance));
+        Tolerance { mode, tolerance: self.tolerance, feature_tolerance, feature_weight: 1.0 }
+    }
+
     fn wanted_regions(&self, tolerance: f64) -> Wanted {
         Wanted {
             spheres: matches!(self.fit, Fits::Both | Fits::Sphere),
@@ -188,15 +199,11 @@ pub enum SimplifyFitError {
     #[error("`remove` and `target-faces` both say how many faces to leave")]
     TwoTargets,
     /// A parameter is out of range.
-    #[error("{name} must be {range}, got {value}")]
-    OutOfRange {
-        /// The parameter.
-        name: &'static str,
-        /// What it may be.
-        range: &'static str,
-        /// What it is.
-        value: f64,
-    },
+    #[error(transparent)]
+    OutOfRange(#[from] OutOfRange),
+    /// The tolerance makes no sense.
+    #[error(transparent)]
+    Tolerance(#[from] ToleranceError),
     /// A lock names a group that is not there.
     #[error(transparent)]
     Locks(#[from] FreedomError),
@@ -298,8 +305,8 @@ fn simplified(
     stats.vertices_on_fits = on_fits.iter().flatten().count();
     stats.radii = report::histogram(on_fits.into_iter().flatten());
     stats.largest_projection = done.largest_projection;
-    stats.refused_by_tolerance = counts.beyond_tolerance;
-    stats.refused_by_intersection = counts.collisions;
+    stats.refused_by_tolerance = counts.refused_by_tolerance;
+    stats.refused_by_intersection = counts.refused_by_intersection;
     stats.barred = barred;
     stats.smooth_edges = smooth_edges;
     stats.tolerance = plan.tolerance;
@@ -395,17 +402,10 @@ impl Plan {
         };
         check(params)?;
         let diagonal = diagonal(input.reference);
-        let tolerance = params.tolerance.resolve(diagonal);
+        let tolerance = params.tolerance().resolve(diagonal)?;
         let is_plane = params.tolerance_mode == FitTolerance::Plane;
-        if tolerance.is_nan() || (tolerance <= 0.0 && !is_plane) {
-            let range = "above 0";
-            return Err(SimplifyFitError::OutOfRange { name: "tolerance", range, value: tolerance });
-        }
-        let feature_tolerance = params.feature_tolerance.map_or(tolerance, |length| length.resolve(diagonal));
         let max_size = params.max_size.map_or(f64::INFINITY, |length| length.resolve(diagonal));
-        if max_size.is_nan() || max_size <= 0.0 {
-            return Err(SimplifyFitError::OutOfRange { name: "max-size", range: "above 0", value: max_size });
-        }
+        OutOfRange::unless(max_size > 0.0, "max-size", "above 0", max_size)?;
         let limits = Limits {
             min_stretch: least_stretch_of(params.max_aspect),
             max_size: SizeField::Uniform(max_size),
@@ -413,15 +413,15 @@ impl Plan {
             max_valence: usize::MAX,
         };
         let setup = Setup {
-            mode: if is_plane { ToleranceMode::QuadricRms } else { ToleranceMode::Distance },
+            mode: tolerance.mode,
             // Nothing but projections is bounded in plane mode.
-            tolerance: if is_plane { f64::INFINITY } else { tolerance },
-            feature_tolerance,
-            feature_weight: 1.0,
+            tolerance: if is_plane { f64::INFINITY } else { tolerance.tolerance },
+            feature_tolerance: tolerance.feature_tolerance,
+            feature_weight: tolerance.feature_weight,
             limits,
-            may_merge_corners: input.locks.keep.is_empty() && input.locks.only.is_empty(),
+            may_merge_corners: !input.locks.name_elements(),
         };
-        Ok(Self { target, tolerance, setup, may_insert: true })
+        Ok(Self { target, tolerance: tolerance.tolerance, setup, may_insert: true })
     }
 }
 
@@ -430,9 +430,9 @@ fn least_stretch_of(max_aspect: f64) -> f64 {
     1.5 / max_aspect
 }
 
-fn check(params: &SimplifyFitParams) -> Result<(), SimplifyFitError> {
+fn check(params: &SimplifyFitParams) -> Result<(), OutOfRange> {
     let within = |name, range, value: f64, [least, most]: [f64; 2]| {
-        if (least..=most).contains(&value) { Ok(()) } else { Err(SimplifyFitError::OutOfRange { name, range, value }) }
+        OutOfRange::unless((least..=most).contains(&value), name, range, value)
     };
     within("k-m", "from 0 to 3", params.k_m, [0.0, 3.0])?;
     within("k1", "from 0 to 10", params.k1, [0.0, 10.0])?;
@@ -453,7 +453,8 @@ impl From<SimplifyFitError> for StepFailure {
             SimplifyFitError::Cancelled(cancelled) => cancelled.into(),
             SimplifyFitError::TwoTargets => Self::failed(message).with_help("give one of them"),
             SimplifyFitError::NotASurface(_) => Self::bad_input(message).with_help("run `repair` first"),
-            SimplifyFitError::OutOfRange { .. } | SimplifyFitError::Locks(_) => Self::failed(message),
+            SimplifyFitError::Tolerance(error) => error.into(),
+            SimplifyFitError::OutOfRange(_) | SimplifyFitError::Locks(_) => Self::failed(message),
         }
     }
 }
@@ -466,12 +467,7 @@ impl crate::step::Step for Step {
     const REVISION: u32 = 9;
     const INPUTS: &'static [InputDef] = &[
         InputDef { name: "from", accepts: &[Port::Surface], required: true, doc: "the surface to simplify" },
-        InputDef {
-            name: "reference",
-            accepts: &[Port::Surface],
-            required: false,
-            doc: "what the tolerance is measured against; default: `from`",
-        },
+        REFERENCE,
     ];
     const OUTPUTS: &'static [OutputDef] = &[OutputDef { name: "main", port: OutPort::Is(Port::Surface), derive: None }];
     const EDITS: bool = true;

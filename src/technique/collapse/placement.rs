@@ -8,6 +8,7 @@
 use glam::DVec3;
 
 use crate::mesh::edit::Placement;
+use crate::metric::ToleranceMode;
 use crate::technique::guarded::Site;
 
 /// In what order positions are tried.
@@ -23,6 +24,14 @@ pub enum Order {
 const MOST: usize = 5;
 
 impl Order {
+    /// As printed where quadrics are the tolerance; else on the surface, as the tolerance is kept by other tests.
+    pub fn of(mode: ToleranceMode) -> Self {
+        match mode {
+            ToleranceMode::QuadricSum | ToleranceMode::QuadricRms => Self::Printed,
+            ToleranceMode::Distance => Self::OnSurface,
+        }
+    }
+
     /// The positions to try, best first; each is only computed when the ones before it have failed.
     pub fn candidates(self, site: &Site) -> impl Iterator<Item = DVec3> + '_ {
         (0..MOST).filter_map(move |i| match site.placement {

@@ -7,6 +7,8 @@
 //! the mesh, so the guarantee is one of the type.
 
 use glam::DVec3;
+use schemars::JsonSchema;
+use serde::Serialize;
 
 use super::certificate::Change;
 use super::collision::Collision;
@@ -22,21 +24,22 @@ use crate::mesh::halfedge::{HalfedgeMesh, edge_of, twin};
 use crate::mesh::{FaceId, Freedom, HalfedgeId, VertexId};
 use crate::technique::hierarchy::Recorder;
 
-/// What was done, and why edits were refused.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+/// What was done, and why edits were refused: a part of the statistics of steps.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
 pub struct Counts {
-    /// Collapses applied.
+    /// Edges collapsed.
     pub collapses: usize,
-    /// Flips applied.
+    /// Edges flipped.
     pub flips: usize,
-    /// Splits applied.
+    /// Edges split.
     pub splits: usize,
     /// Vertices moved.
     pub moves: usize,
-    /// Edits refused by the certified distance.
-    pub beyond_tolerance: usize,
-    /// Edits refused because faces would intersect.
-    pub collisions: usize,
+    /// Edits refused because the surface would have left the tolerance.
+    pub refused_by_tolerance: usize,
+    /// Edits refused because faces would have intersected.
+    pub refused_by_intersection: usize,
 }
 
 impl Counts {
@@ -55,8 +58,8 @@ impl std::ops::Add for Counts {
             flips: self.flips + other.flips,
             splits: self.splits + other.splits,
             moves: self.moves + other.moves,
-            beyond_tolerance: self.beyond_tolerance + other.beyond_tolerance,
-            collisions: self.collisions + other.collisions,
+            refused_by_tolerance: self.refused_by_tolerance + other.refused_by_tolerance,
+            refused_by_intersection: self.refused_by_intersection + other.refused_by_intersection,
         }
     }
 }
@@ -250,8 +253,8 @@ impl GuardedMesh<'_> {
         let admitted = self.costly_tests(&mut patch);
         self.patch = patch;
         match admitted {
-            Err(Refused::Tolerance) => self.counts.beyond_tolerance += 1,
-            Err(_) => self.counts.collisions += 1,
+            Err(Refused::Tolerance) => self.counts.refused_by_tolerance += 1,
+            Err(_) => self.counts.refused_by_intersection += 1,
             Ok(()) => {}
         }
         admitted

@@ -37,7 +37,7 @@ pub use gain::Gain;
 pub use limits::{Limits, SizeField, StarRules};
 pub use merge::Merge;
 pub use mesh::{Counts, GuardedMesh};
-pub use open::{Setup, ToleranceMode, diagonal, open, reference_tree};
+pub use open::{Setup, diagonal, open, reference_tree};
 pub use recount::{Cause, Recount, Threshold, Violation, cause, recount};
 pub use refused::Refused;
 pub use tally::Tally;

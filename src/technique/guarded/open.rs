@@ -1,8 +1,6 @@
 //! Opening a guarded mesh: what its tolerance means, what it is held against, and which corners may merge.
 
 use glam::DVec3;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 use super::certificate::Envelope;
 use super::corners::free_close_corners;
@@ -13,20 +11,7 @@ use crate::mesh::bvh::TriangleBvh;
 use crate::mesh::geometry::Aabb;
 use crate::mesh::halfedge::{EnterError, HalfedgeMesh};
 use crate::mesh::{Freedom, ResolvedFreedom, Surface};
-
-/// What a tolerance means.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum ToleranceMode {
-    /// The sum of squared distances to the planes of all faces merged so far: the measure of the papers. A squared
-    /// length, so a plain number; it grows with the density of the input.
-    QuadricSum,
-    /// The root mean square of the distances to those planes: a length. Fast, and no bound of the distance.
-    QuadricRms,
-    /// The largest distance between result and reference, both ways, kept by certified tests: a length.
-    #[default]
-    Distance,
-}
+use crate::metric::ToleranceMode;
 
 /// What a guarded mesh is opened with.
 #[derive(Clone, Debug)]

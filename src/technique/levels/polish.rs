@@ -10,7 +10,8 @@ use serde::Serialize;
 use super::report::Shape;
 use crate::mesh::bvh::TriangleBvh;
 use crate::mesh::{LockRules, Surface, resolve_freedom};
-use crate::technique::guarded::{Limits, Setup, SizeField, ToleranceMode, open};
+use crate::metric::ToleranceMode;
+use crate::technique::guarded::{Limits, Setup, SizeField, open};
 use crate::technique::remesh::optimise;
 use crate::watch::{Cancelled, Watch};
 
