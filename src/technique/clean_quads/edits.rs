@@ -27,9 +27,16 @@ enum Kind {
     Pillow(u32),
 }
 
+/// A vertex of more edges than this is left to the layers that mesh anew: every edit at it, and at the quads round it,
+/// would look at all of them.
+const HUB: usize = 64;
+
 impl Cleaner<'_, '_> {
     /// Tries the edits at `v`, those that gain most first. Whether one was kept.
     pub(super) fn best_edit(&mut self, v: u32) -> bool {
+        if self.is_at_hub(v) {
+            return false;
+        }
         let mut kinds: Vec<(f64, usize, Kind)> = Vec::new();
         for (i, kind) in self.kinds(v).into_iter().enumerate() {
             if let Some(gain) = self.gain(kind)
@@ -55,6 +62,12 @@ impl Cleaner<'_, '_> {
             }
         }
         best.is_some_and(|(_, gain, kind)| self.attempt(kind, gain, true).is_some())
+    }
+
+    /// Whether a face at the vertex has a corner of very many edges.
+    fn is_at_hub(&self, v: u32) -> bool {
+        let is_hub = |w: u32| self.mesh.star(w).nth(HUB).is_some();
+        is_hub(v) || self.mesh.faces_at(v).any(|f| self.mesh.corners(f).into_iter().any(is_hub))
     }
 
     fn kinds(&self, v: u32) -> Vec<Kind> {

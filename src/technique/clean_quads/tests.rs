@@ -101,6 +101,28 @@ fn irregular(mesh: &Mixed) -> usize {
 }
 
 #[test]
+fn a_vertex_of_very_many_edges_costs_nothing() {
+    let n: u32 = 8000;
+    let round = |i: u32| f64::from(i) * std::f64::consts::TAU / f64::from(n);
+    let rim = (0..n).map(|i| dvec3(libm::cos(round(i)), libm::sin(round(i)), 0.0));
+    let points: Vec<DVec3> = std::iter::once(DVec3::ZERO).chain(rim).collect();
+    let corner = |i: u32| VertexId::from_raw(1 + i % n);
+    let faces: Vec<_> = (0..n).map(|i| [VertexId::from_raw(0), corner(i), corner(i + 1)]).collect();
+    let surface = Surface { points: points.into(), faces: faces.into(), ..Surface::default() };
+    let ground = Ground::new(&surface);
+    let quad = |i: u32| Facet::Quad([VertexId::from_raw(0), corner(2 * i), corner(2 * i + 1), corner(2 * i + 2)]);
+    let faces: Vec<_> = (0..n / 2).map(quad).collect();
+    let soup = Soup { points: surface.points.clone(), faces: faces.into(), ..Soup::default() };
+    let regions = (0..n as usize / 2).map(|i| ground.regions[2 * i]).collect();
+    let triangles = ground.workshop().unwrap();
+    let arc = |a: VertexId, b: VertexId| triangles.find(a.raw(), b.raw()).map_or(NONE, |h| triangles.arc(h));
+    let mut mesh = Mixed::new(&soup, ground.places.clone(), regions, arc).unwrap();
+    let awake = vec![true; ground.region_count()];
+    let mut cleaner = Cleaner::new(&mut mesh, &ground, 0.1, &awake);
+    assert!((0..9).all(|v| !cleaner.best_edit(v)), "pairs of its edges alone are 16 million");
+}
+
+#[test]
 fn irregular_vertices_that_lie_apart_cancel_out() {
     let surface = sheet(0.0, None);
     let ground = Ground::new(&surface);
