@@ -1,10 +1,14 @@
 //! The command as people use it: output, files and exit codes, in a folder of its own.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use assert_cmd::Command;
 use predicates::prelude::*;
+
+#[path = "common/desk.rs"]
+mod desk;
+
+use desk::Desk;
 
 const RECIPE: &str = r#"
 name = "part"
@@ -25,29 +29,11 @@ min-stretch = { at-least = "=limit" }
 clean = ["result.stl", "result.vtu"]
 "#;
 
-const CUBE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1\n\
-    f 1 3 2\nf 1 4 3\nf 5 6 7\nf 5 7 8\nf 1 2 6\nf 1 6 5\nf 2 3 7\nf 2 7 6\nf 3 4 8\nf 3 8 7\nf 4 1 5\nf 4 5 8\n";
-
-struct Desk {
-    folder: tempfile::TempDir,
-}
+const CUBE: &str = include_str!("common/cube.obj");
 
 impl Desk {
     fn new() -> Self {
-        let folder = tempfile::tempdir().unwrap();
-        fs::write(folder.path().join("recipe.toml"), RECIPE).unwrap();
-        fs::write(folder.path().join("cube.obj"), CUBE).unwrap();
-        Self { folder }
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.folder.path().join(name)
-    }
-
-    fn meshmill(&self, arguments: &[&str]) -> Command {
-        let mut command = Command::new(assert_cmd::cargo::cargo_bin!("meshmill"));
-        command.current_dir(self.folder.path()).env("MESHMILL_CACHE", self.path("cache")).args(arguments);
-        command
+        Self::with(&[("recipe.toml", RECIPE), ("cube.obj", CUBE)])
     }
 }
 
@@ -86,7 +72,7 @@ fn a_failed_gate_exits_with_3_and_shows_the_elements() {
 fn a_wrong_recipe_or_argument_exits_with_2_and_runs_nothing() {
     let desk = Desk::new();
     let unknown = RECIPE.replace("use = \"repair\"", "use = \"repiar\"");
-    fs::write(desk.path("wrong.toml"), unknown).unwrap();
+    desk.write("wrong.toml", &unknown);
     let wrong = desk.meshmill(&["run", "wrong.toml"]).assert().code(2);
     wrong.stderr(predicate::str::contains("wrong.toml:").and(predicate::str::contains("`repair`")));
     desk.meshmill(&["run", "missing.toml"]).assert().code(2);
@@ -102,7 +88,7 @@ fn a_wrong_recipe_or_argument_exits_with_2_and_runs_nothing() {
 #[test]
 fn a_damaged_input_exits_with_2() {
     let desk = Desk::new();
-    fs::write(desk.path("cube.obj"), "v 0 0 0\nf 1 2 3\n").unwrap();
+    desk.write("cube.obj", "v 0 0 0\nf 1 2 3\n");
     desk.meshmill(&["run", "recipe.toml"]).assert().code(2).stderr(predicate::str::contains("raw"));
 }
 
@@ -110,9 +96,9 @@ fn a_damaged_input_exits_with_2() {
 fn what_a_failed_run_did_not_write_is_not_left_from_the_last_one() {
     let desk = Desk::new();
     desk.meshmill(&["run", "recipe.toml", "--out", "o"]).assert().success();
-    fs::write(desk.path("o/mine.txt"), "mine").unwrap();
-    fs::write(desk.path("o/result.stl"), "changed by hand").unwrap();
-    fs::write(desk.path("cut.obj"), "v 0 0\n").unwrap();
+    desk.write("o/mine.txt", "mine");
+    desk.write("o/result.stl", "changed by hand");
+    desk.write("cut.obj", "v 0 0\n");
     desk.meshmill(&["run", "recipe.toml", "--out", "o", "--input", "part=cut.obj"]).assert().code(2);
     assert_eq!(names(&desk.path("o")), ["mine.txt", "result.stl", "run.ron"], "what somebody made stays");
 }
@@ -122,7 +108,7 @@ fn what_a_failed_run_did_not_write_is_not_left_from_the_last_one() {
 fn an_output_goes_through_a_link_and_into_a_device() {
     let desk = Desk::new();
     fs::create_dir(desk.path("kept")).unwrap();
-    fs::write(desk.path("kept/real.off"), "").unwrap();
+    desk.write("kept/real.off", "");
     std::os::unix::fs::symlink("kept/real.off", desk.path("link.off")).unwrap();
     desk.meshmill(&["convert", "cube.obj", "link.off"]).assert().success();
     assert!(fs::symlink_metadata(desk.path("link.off")).unwrap().is_symlink());
@@ -133,7 +119,7 @@ fn an_output_goes_through_a_link_and_into_a_device() {
 fn a_part_that_collapses_in_32_bits_is_not_written() {
     let desk = Desk::new();
     let far = CUBE.replace("v 0", "v 1e9").replace("v 1 ", "v 1000000001 ");
-    fs::write(desk.path("far.obj"), far).unwrap();
+    desk.write("far.obj", &far);
     let refused = predicate::str::contains("same point in 32 bits").and(predicate::str::contains("origin"));
     desk.meshmill(&["convert", "far.obj", "far.stl"]).assert().code(4).stderr(refused);
     desk.meshmill(&["convert", "far.obj", "far.stl", "--text"]).assert().success();
@@ -142,7 +128,7 @@ fn a_part_that_collapses_in_32_bits_is_not_written() {
 #[test]
 fn convert_tells_what_a_format_cannot_hold() {
     let desk = Desk::new();
-    fs::write(desk.path("named.obj"), CUBE.replacen("f ", "g lid\nf ", 1) + "g rim\nl 1 2\n").unwrap();
+    desk.write("named.obj", &(CUBE.replacen("f ", "g lid\nf ", 1) + "g rim\nl 1 2\n"));
     let kept = predicate::str::contains("not kept").not();
     desk.meshmill(&["convert", "named.obj", "named.vtu"]).assert().success().stderr(kept);
     let lost = predicate::str::contains("face groups `lid`").and(predicate::str::contains("edge groups `rim`"));
@@ -178,9 +164,9 @@ fn json_is_one_document_on_stdout() {
 #[test]
 fn what_is_printed_as_json_has_one_shape_and_its_schema() {
     let desk = Desk::new();
-    fs::write(desk.path("other.obj"), CUBE.replace("v 1 1 1", "v 1 1 2")).unwrap();
-    let text = fs::read_to_string(desk.path("recipe.toml")).unwrap();
-    fs::write(desk.path("measured.toml"), text + "\n[steps.numbers]\nuse = \"measure\"\nfrom = \"clean\"\n").unwrap();
+    desk.write("other.obj", &CUBE.replace("v 1 1 1", "v 1 1 2"));
+    let text = desk.text("recipe.toml");
+    desk.write("measured.toml", &(text + "\n[steps.numbers]\nuse = \"measure\"\nfrom = \"clean\"\n"));
     desk.meshmill(&["run", "recipe.toml", "--out", "a", "-q"]).assert().success();
     desk.meshmill(&["run", "recipe.toml", "--out", "b", "-q", "--input", "part=other.obj"]).output().unwrap();
     let schema: serde_json::Value =
@@ -210,9 +196,9 @@ fn what_is_printed_as_json_has_one_shape_and_its_schema() {
 fn names_from_files_do_not_steer_the_terminal() {
     let desk = Desk::new();
     let named = CUBE.replacen("f ", "g \u{1b}[31mlid\u{202e}\nf ", 1);
-    fs::write(desk.path("named.obj"), &named).unwrap();
-    let text = fs::read_to_string(desk.path("recipe.toml")).unwrap().replace("cube.obj", "named.obj");
-    fs::write(desk.path("named.toml"), text.replace("result.vtu", "result.csv")).unwrap();
+    desk.write("named.obj", &named);
+    let text = desk.text("recipe.toml").replace("cube.obj", "named.obj");
+    desk.write("named.toml", &text.replace("result.vtu", "result.csv"));
     let commands: [&[&str]; 4] = [
         &["convert", "named.obj", "named.csv"],
         &["measure", "named.obj"],
@@ -225,7 +211,7 @@ fn names_from_files_do_not_steer_the_terminal() {
         let said = String::from_utf8(said).unwrap();
         assert!(!said.contains("\u{1b}[31mlid") && !said.contains('\u{202e}'), "{arguments:?}: {said}");
     }
-    let page = fs::read_to_string(desk.path("o/report.html")).unwrap();
+    let page = desk.text("o/report.html");
     assert!(page.contains("face groups") && !page.contains('\u{202e}'), "a name turns the page's direction of writing");
 }
 
@@ -314,9 +300,9 @@ fn the_report_is_one_file_that_repeats_and_needs_no_network() {
     let desk = Desk::new();
     desk.meshmill(&["report", "recipe.toml"]).assert().code(2).stderr(predicate::str::contains("run the recipe first"));
     desk.meshmill(&["run", "recipe.toml", "--report"]).assert().success();
-    let page = fs::read_to_string(desk.path("out/part/report.html")).unwrap();
+    let page = desk.text("out/part/report.html");
     desk.meshmill(&["report", "recipe.toml"]).assert().success();
-    assert_eq!(fs::read_to_string(desk.path("out/part/report.html")).unwrap(), page);
+    assert_eq!(desk.text("out/part/report.html"), page);
     for part in ["<h1>part</h1>", "id=\"step-clean\"", "class=\"chart\"", "min-stretch", "[steps.raw]", "id=\"data\""] {
         assert!(page.contains(part), "no {part}");
     }
@@ -324,7 +310,7 @@ fn the_report_is_one_file_that_repeats_and_needs_no_network() {
         assert!(!page.contains(outside), "{outside}");
     }
     desk.meshmill(&["report", "out/part", "--step", "clean", "--out", "one.html"]).assert().success();
-    assert!(fs::read_to_string(desk.path("one.html")).unwrap().contains("\"pair\":[\"clean\",\"clean\"]"));
+    assert!(desk.text("one.html").contains("\"pair\":[\"clean\",\"clean\"]"));
     let unknown = desk.meshmill(&["report", "out/part", "--step", "claen"]).assert().code(2);
     unknown.stderr(predicate::str::contains("claen").and(predicate::str::contains("raw, clean")));
 }
@@ -334,9 +320,9 @@ fn nothing_of_a_recipe_becomes_markup_of_its_report() {
     let desk = Desk::new();
     let hostile =
         RECIPE.replace("name = \"part\"", "name = \"part\"\ndescription = \"</script><img src=x onerror=1>\"");
-    fs::write(desk.path("recipe.toml"), hostile).unwrap();
+    desk.write("recipe.toml", &hostile);
     desk.meshmill(&["run", "recipe.toml", "--report"]).assert().success();
-    let page = fs::read_to_string(desk.path("out/part/report.html")).unwrap();
+    let page = desk.text("out/part/report.html");
     assert!(page.contains("&lt;img src=x onerror=1&gt;") && !page.contains("<img src=x"));
 }
 
@@ -344,14 +330,14 @@ fn nothing_of_a_recipe_becomes_markup_of_its_report() {
 fn the_report_of_a_sweep_shows_every_case() {
     let desk = Desk::new();
     let recipe = format!("{RECIPE}[sweep]\ncolumns = [\"clean.faces\", \"clean.min-stretch\"]\n");
-    fs::write(desk.path("recipe.toml"), recipe).unwrap();
+    desk.write("recipe.toml", &recipe);
     desk.meshmill(&["sweep", "recipe.toml", "-s", "limit=0.1,0.2,0.99", "--report"]).assert().code(3);
-    let page = fs::read_to_string(desk.path("out/part-sweep/report.html")).unwrap();
+    let page = desk.text("out/part-sweep/report.html");
     for part in ["id=\"sweep\"", "3 cases, 2 passed", "limit-0.99", "class=\"sortable\"", "Results"] {
         assert!(page.contains(part), "no {part}");
     }
     desk.meshmill(&["report", "out/part-sweep", "--out", "again.html"]).assert().success();
-    assert_eq!(fs::read_to_string(desk.path("again.html")).unwrap(), page);
+    assert_eq!(desk.text("again.html"), page);
 }
 
 #[test]
@@ -359,7 +345,7 @@ fn what_a_reader_left_out_is_told_by_every_command_alike() {
     let desk = Desk::new();
     let deck = "*NODE\n1, 0, 0, 0\n2, 1, 0, 0\n3, 0, 1, 0\n4, 0, 0, 1\n*ELEMENT, TYPE=S3\n1, 1, 3, 2\n2, 1, 2, 4\n\
         3, 2, 3, 4\n4, 1, 4, 3\n*SURFACE, NAME=s, COMBINE=UNION\nr\n";
-    fs::write(desk.path("part.inp"), deck).unwrap();
+    desk.write("part.inp", &deck);
     let told = || predicate::str::contains("left out on reading: surface `s` (line 11): COMBINE=UNION").count(1);
     desk.meshmill(&["measure", "part.inp"]).assert().success().stderr(told());
     desk.meshmill(&["convert", "part.inp", "part.off"]).assert().success().stderr(told());

@@ -1,10 +1,11 @@
 //! What a run writes keeps the promises of its gates, or says that it does not.
 
-use std::fs;
-use std::path::PathBuf;
-
-use assert_cmd::Command;
 use predicates::prelude::*;
+
+#[path = "common/desk.rs"]
+mod desk;
+
+use desk::Desk;
 
 /// A tetrahedron far from the origin, where single precision has steps of an eighth.
 const FAR: [f64; 3] = [1e6 + 0.06, 2e6 + 0.06, 0.0];
@@ -22,33 +23,20 @@ distance = { to = "raw", at-most = 0.01 }
 raw = ["result.stl"]
 "#;
 
-struct Desk {
-    folder: tempfile::TempDir,
-}
-
 impl Desk {
     fn new(at: [f64; 3], recipe: &str) -> Self {
-        let folder = tempfile::tempdir().unwrap();
         let corners = [[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0], [0.0, 0.0, 4.0]];
         let point = |p: [f64; 3]| format!("v {} {} {}\n", p[0] + at[0], p[1] + at[1], p[2] + at[2]);
         let faces = "g A\nf 1 3 2\nf 1 2 4\ng B\nf 2 3 4\nf 3 1 4\n";
-        fs::write(folder.path().join("part.obj"), corners.map(point).concat() + faces).unwrap();
-        fs::write(folder.path().join("recipe.toml"), recipe).unwrap();
-        Self { folder }
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.folder.path().join(name)
+        Self::with(&[("part.obj", &(corners.map(point).concat() + faces)), ("recipe.toml", recipe)])
     }
 
     fn run(&self, arguments: &[&str]) -> assert_cmd::assert::Assert {
-        let mut command = Command::new(assert_cmd::cargo::cargo_bin!("meshmill"));
-        command.current_dir(self.folder.path()).env("MESHMILL_CACHE", self.path("cache"));
-        command.args(["run", "recipe.toml", "--pictures", "none", "--out", "o"]).args(arguments).assert()
+        self.meshmill(&["run", "recipe.toml", "--pictures", "none", "--out", "o"]).args(arguments).assert()
     }
 
     fn is_text(&self, name: &str) -> bool {
-        fs::read(self.path(name)).unwrap().starts_with(b"solid")
+        self.text(name).starts_with("solid")
     }
 }
 
@@ -60,7 +48,7 @@ fn a_binary_stl_that_would_break_its_gate_is_written_as_text() {
     assert!(desk.is_text("o/result.stl"));
     // Up to date, it says the same; the key of the file covers the gate.
     desk.run(&["--json"]).success().stdout(predicate::str::contains("its gate would not hold"));
-    fs::write(desk.path("recipe.toml"), RECIPE.replace("0.01", "10")).unwrap();
+    desk.write("recipe.toml", &RECIPE.replace("0.01", "10"));
     desk.run(&[]).success().stdout(said.not());
     assert!(!desk.is_text("o/result.stl"), "this gate holds in single precision");
     let near = Desk::new([0.0; 3], RECIPE);
@@ -100,17 +88,17 @@ fn what_a_file_does_not_hold_is_in_the_report_and_a_gate_can_ask_for_it() {
     desk.run(&[]).success().stdout(predicate::str::contains("without face groups `A`, `B`"));
     let kept = "distance = { to = \"raw\", at-most = 0.01 }\ngroups-kept = { of = \"raw\", files = true }";
     let asked = RECIPE.replace("distance = { to = \"raw\", at-most = 0.01 }", kept);
-    fs::write(desk.path("recipe.toml"), &asked).unwrap();
+    desk.write("recipe.toml", &asked);
     // As text, an STL has solids with names.
     desk.run(&[]).success();
     assert!(desk.is_text("o/result.stl"));
-    fs::write(desk.path("recipe.toml"), asked.replace("result.stl", "result.csv")).unwrap();
+    desk.write("recipe.toml", &asked.replace("result.stl", "result.csv"));
     desk.run(&[]).code(4).stderr(predicate::str::contains("`groups-kept` asks for face groups `A`, `B`"));
-    fs::write(desk.path("recipe.toml"), asked.replace("result.stl", "result.inp")).unwrap();
+    desk.write("recipe.toml", &asked.replace("result.stl", "result.inp"));
     desk.run(&[]).success();
-    fs::write(desk.path("recipe.toml"), asked.replace("files = true", "files = 1")).unwrap();
+    desk.write("recipe.toml", &asked.replace("files = true", "files = 1"));
     desk.run(&[]).code(2).stderr(predicate::str::contains("`files` is true or false"));
     let wrong = asked.replace("0.01 }", "0.01, files = true }");
-    fs::write(desk.path("recipe.toml"), wrong).unwrap();
+    desk.write("recipe.toml", &wrong);
     desk.run(&[]).code(2).stderr(predicate::str::contains("`files` is for `groups-kept`"));
 }

@@ -1,10 +1,14 @@
 //! Nothing that a run reads is lost, nothing outside its folder is touched, and two runs never mix.
 
 use std::fs;
-use std::path::PathBuf;
 
 use assert_cmd::Command;
 use predicates::prelude::*;
+
+#[path = "common/desk.rs"]
+mod desk;
+
+use desk::Desk;
 
 const RECIPE: &str = r#"
 name = "part"
@@ -24,38 +28,15 @@ min-stretch = { at-least = "=stretch" }
 clean = ["result.obj", "deep/result.vtu"]
 "#;
 
-const CUBE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1\n\
-    f 1 3 2\nf 1 4 3\nf 5 6 7\nf 5 7 8\nf 1 2 6\nf 1 6 5\nf 2 3 7\nf 2 7 6\nf 3 4 8\nf 3 8 7\nf 4 1 5\nf 4 5 8\n";
-
-struct Desk {
-    folder: tempfile::TempDir,
-}
+const CUBE: &str = include_str!("common/cube.obj");
 
 impl Desk {
     fn new() -> Self {
-        let folder = tempfile::tempdir().unwrap();
-        fs::write(folder.path().join("recipe.toml"), RECIPE).unwrap();
-        fs::write(folder.path().join("cube.obj"), CUBE).unwrap();
-        Self { folder }
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.folder.path().join(name)
-    }
-
-    fn write(&self, name: &str, text: &str) {
-        fs::create_dir_all(self.path(name).parent().unwrap()).unwrap();
-        fs::write(self.path(name), text).unwrap();
-    }
-
-    fn text(&self, name: &str) -> String {
-        fs::read_to_string(self.path(name)).unwrap()
+        Self::with(&[("recipe.toml", RECIPE), ("cube.obj", CUBE)])
     }
 
     fn run(&self, arguments: &[&str]) -> assert_cmd::assert::Assert {
-        let mut command = Command::new(assert_cmd::cargo::cargo_bin!("meshmill"));
-        command.current_dir(self.folder.path()).env("MESHMILL_CACHE", self.path("cache"));
-        command.args(["run", "recipe.toml", "--pictures", "none"]).args(arguments).assert()
+        self.meshmill(&["run", "recipe.toml", "--pictures", "none"]).args(arguments).assert()
     }
 }
 
@@ -107,7 +88,7 @@ fn a_recipe_a_base_or_a_lock_is_no_output() {
     assert_eq!(desk.text("o/result.obj"), RECIPE);
     let lock = Desk::new();
     let mut command = Command::new(assert_cmd::cargo::cargo_bin!("meshmill"));
-    command.current_dir(lock.folder.path()).env("MESHMILL_CACHE", lock.path("cache"));
+    command.current_dir(lock.path("")).env("MESHMILL_CACHE", lock.path("cache"));
     command.args(["lock", "recipe.toml", "--to", "cube.obj"]).assert().code(2);
     assert_eq!(lock.text("cube.obj"), CUBE);
     lock.run(&["--trace", "./recipe.toml"]).code(2);
@@ -166,7 +147,7 @@ fn a_limit_on_the_size_of_files_is_an_error_of_the_disk() {
     let program = assert_cmd::cargo::cargo_bin!("meshmill").display().to_string();
     let script = format!("ulimit -f 1 && exec '{program}' run recipe.toml --out o --pictures none");
     let mut command = Command::new("bash");
-    command.current_dir(desk.folder.path()).env("MESHMILL_CACHE", desk.path("cache")).args(["-c", &script]);
+    command.current_dir(desk.path("")).env("MESHMILL_CACHE", desk.path("cache")).args(["-c", &script]);
     command.assert().code(6).stderr(predicate::str::contains("File too large"));
     for folder in ["o", "o/deep", "cache/v2/tmp"] {
         let Ok(entries) = fs::read_dir(desk.path(folder)) else { continue };
@@ -206,7 +187,7 @@ fn a_lock_is_not_replaced_by_what_a_run_writes_nor_a_result_by_a_lock() {
     let desk = Desk::new();
     let lock = |arguments: &[&str]| {
         let mut command = Command::new(assert_cmd::cargo::cargo_bin!("meshmill"));
-        command.current_dir(desk.folder.path()).env("MESHMILL_CACHE", desk.path("cache"));
+        command.current_dir(desk.path("")).env("MESHMILL_CACHE", desk.path("cache"));
         command.args(["lock", "recipe.toml"]).args(arguments).assert()
     };
     lock(&["--out", "o"]).success();
@@ -273,7 +254,7 @@ fn an_input_replaced_during_a_run_is_noticed_by_the_next() {
     let recipe = RECIPE.replace("[gates.clean]", &format!("{slow}[gates.clean]"));
     desk.write("recipe.toml", &recipe.replace("[outputs]\n", "[outputs]\nfiner = [\"finer.vtu\"]\n"));
     let mut child = std::process::Command::new(assert_cmd::cargo::cargo_bin!("meshmill"))
-        .current_dir(desk.folder.path())
+        .current_dir(desk.path(""))
         .env("MESHMILL_CACHE", desk.path("cache"))
         .args(["run", "recipe.toml", "--pictures", "none", "--out", "o", "-q"])
         .spawn()

@@ -2,10 +2,13 @@
 //! they were.
 
 use std::fs;
-use std::path::PathBuf;
 
-use assert_cmd::Command;
 use predicates::prelude::*;
+
+#[path = "common/desk.rs"]
+mod desk;
+
+use desk::Desk;
 
 const RECIPE: &str = "name = \"part\"\n[inputs]\npart = \"main.inp\"\n[steps.raw]\nuse = \"read\"\nfile = \"=inputs.part\"\n\
     [outputs]\nraw = [\"result.obj\"]\n";
@@ -14,14 +17,10 @@ const NODES: &str = "*NODE\n1, 0, 0, 0\n2, 1, 0, 0\n3, 0, 1, 0\n";
 
 const MAIN: &str = "*INCLUDE, INPUT=parts/mesh.inc\n*NSET, NSET=tip\n3,\n";
 
-struct Desk {
-    folder: tempfile::TempDir,
-}
-
 impl Desk {
     /// A deck that includes a file, which includes another.
     fn new() -> Self {
-        let desk = Self { folder: tempfile::tempdir().unwrap() };
+        let desk = Self::with(&[]);
         desk.write("deck/recipe.toml", RECIPE);
         desk.write("deck/main.inp", MAIN);
         desk.write("deck/parts/mesh.inc", "*INCLUDE, INPUT=parts/nodes.inc\n*ELEMENT, TYPE=S3\n1, 1, 2, 3\n");
@@ -29,27 +28,12 @@ impl Desk {
         desk
     }
 
-    fn path(&self, name: &str) -> PathBuf {
-        self.folder.path().join(name)
-    }
-
-    fn write(&self, name: &str, text: &str) {
-        fs::create_dir_all(self.path(name).parent().unwrap()).unwrap();
-        fs::write(self.path(name), text).unwrap();
-    }
-
-    fn text(&self, name: &str) -> String {
-        fs::read_to_string(self.path(name)).unwrap()
-    }
-
-    fn meshmill(&self, arguments: &[&str]) -> assert_cmd::assert::Assert {
-        let mut command = Command::new(assert_cmd::cargo::cargo_bin!("meshmill"));
-        command.current_dir(self.path("deck")).env("MESHMILL_CACHE", self.path("cache"));
-        command.args(arguments).assert()
+    fn in_deck(&self, arguments: &[&str]) -> assert_cmd::assert::Assert {
+        self.meshmill(arguments).current_dir(self.path("deck")).assert()
     }
 
     fn run(&self) -> assert_cmd::assert::Assert {
-        self.meshmill(&["run", "recipe.toml", "--pictures", "none", "--out", "o"])
+        self.in_deck(&["run", "recipe.toml", "--pictures", "none", "--out", "o"])
     }
 }
 
@@ -57,7 +41,7 @@ impl Desk {
 #[track_caller]
 fn refused(desk: &Desk, main: &str, message: &str) {
     desk.write("deck/main.inp", main);
-    desk.meshmill(&["measure", "main.inp"]).code(2).stderr(predicate::str::contains(message));
+    desk.in_deck(&["measure", "main.inp"]).code(2).stderr(predicate::str::contains(message));
     desk.run().code(2).stderr(predicate::str::contains(message));
 }
 
@@ -85,12 +69,12 @@ fn decks_of_nastran_include_too() {
     let desk = Desk::new();
     desk.write("deck/grid.inc", "GRID,1,,0.,0.,0.\nGRID,2,,1.,0.,0.\nGRID,3,,0.,1.,0.\n");
     desk.write("deck/main.bdf", "BEGIN BULK\nINCLUDE 'grid.inc'\nCTRIA3,1,1,1,2,3\nENDDATA\n");
-    desk.meshmill(&["measure", "main.bdf"]).success();
+    desk.in_deck(&["measure", "main.bdf"]).success();
     desk.write("deck/main.bdf", "BEGIN BULK\nINCLUDE '.\\grid.inc'\nCTRIA3,1,1,1,2,x\nENDDATA\n");
-    desk.meshmill(&["measure", "main.bdf"]).code(2).stderr(predicate::str::contains("Nastran bulk data, line 3: "));
+    desk.in_deck(&["measure", "main.bdf"]).code(2).stderr(predicate::str::contains("Nastran bulk data, line 3: "));
     desk.write("deck/grid.inc", "GRID,1,,0.,0.,0.\nGRID,2,,1.,y,0.\n");
     let told = "Nastran bulk data, .\\\\grid.inc, line 2: ";
-    desk.meshmill(&["measure", "main.bdf"]).code(2).stderr(predicate::str::contains(told));
+    desk.in_deck(&["measure", "main.bdf"]).code(2).stderr(predicate::str::contains(told));
 }
 
 #[test]
@@ -118,7 +102,7 @@ fn links_may_lead_anywhere_below_the_folder_and_nowhere_else() {
     let desk = Desk::new();
     desk.write("secret.inc", NODES);
     symlink(desk.path("secret.inc"), desk.path("deck/out.inc")).unwrap();
-    symlink(desk.folder.path(), desk.path("deck/up")).unwrap();
+    symlink(desk.path(""), desk.path("deck/up")).unwrap();
     symlink("parts/mesh.inc", desk.path("deck/in.inc")).unwrap();
     refused(&desk, "*INCLUDE, INPUT=out.inc\n", "it lies outside of");
     refused(&desk, "*INCLUDE, INPUT=up/secret.inc\n", "it lies outside of");

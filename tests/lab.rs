@@ -1,12 +1,16 @@
 //! What a laboratory does with recipes: lock them, compare runs, ask why, begin new ones, search, watch.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Stdio;
 use std::time::{Duration, Instant};
 
-use assert_cmd::Command;
 use predicates::prelude::*;
+
+#[path = "common/desk.rs"]
+mod desk;
+
+use desk::Desk;
 
 const RECIPE: &str = r#"
 name = "part"
@@ -32,29 +36,11 @@ min-stretch = { at-least = "=limit" }
 fine = ["result.stl"]
 "#;
 
-const CUBE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1\n\
-    f 1 3 2\nf 1 4 3\nf 5 6 7\nf 5 7 8\nf 1 2 6\nf 1 6 5\nf 2 3 7\nf 2 7 6\nf 3 4 8\nf 3 8 7\nf 4 1 5\nf 4 5 8\n";
-
-struct Desk {
-    folder: tempfile::TempDir,
-}
+const CUBE: &str = include_str!("common/cube.obj");
 
 impl Desk {
     fn new() -> Self {
-        let folder = tempfile::tempdir().unwrap();
-        fs::write(folder.path().join("recipe.toml"), RECIPE).unwrap();
-        fs::write(folder.path().join("cube.obj"), CUBE).unwrap();
-        Self { folder }
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.folder.path().join(name)
-    }
-
-    fn meshmill(&self, arguments: &[&str]) -> Command {
-        let mut command = Command::new(assert_cmd::cargo::cargo_bin!("meshmill"));
-        command.current_dir(self.folder.path()).env("MESHMILL_CACHE", self.path("cache")).args(arguments);
-        command
+        Self::with(&[("recipe.toml", RECIPE), ("cube.obj", CUBE)])
     }
 
     fn run(&self, arguments: &[&str]) {
@@ -75,18 +61,18 @@ fn a_locked_recipe_passes_until_something_changes() {
             .and(predicate::str::contains("fine: parameter times locked 1, now 2")),
     );
     locked(&["--set", "limit=0.2"]).code(5).stderr(predicate::str::contains("gate fine: check min-stretch"));
-    fs::write(desk.path("cube.obj"), CUBE.replace("v 0 1 1", "v 0 1 2")).unwrap();
+    desk.write("cube.obj", &CUBE.replace("v 0 1 1", "v 0 1 2"));
     locked(&[]).code(5).stderr(predicate::str::contains("raw: the file `file` changed"));
-    fs::write(desk.path("cube.obj"), CUBE).unwrap();
+    desk.write("cube.obj", CUBE);
     locked(&[]).success();
-    let lock = fs::read_to_string(desk.path("part.lock.ron")).unwrap();
+    let lock = desk.text("part.lock.ron");
     let other_revision = lock.replacen("\"revision\": \"", "\"revision\": \"9", 1);
-    fs::write(desk.path("other.lock.ron"), other_revision).unwrap();
+    desk.write("other.lock.ron", &other_revision);
     desk.meshmill(&["run", "recipe.toml", "--locked=other.lock.ron"])
         .assert()
         .code(5)
         .stderr(predicate::str::contains("revision locked 9"));
-    fs::write(desk.path("bad.ron"), "no lock").unwrap();
+    desk.write("bad.ron", "no lock");
     desk.meshmill(&["run", "recipe.toml", "--locked=bad.ron"]).assert().code(2);
 }
 
@@ -96,11 +82,11 @@ fn the_class_of_a_lock_decides_which_results_are_equal() {
     for (class, code) in [("bytes", 5), ("metrics", 5), ("tolerance", 0)] {
         let arguments = ["lock", "recipe.toml", "--class", class, "--tolerance", "0.01", "--to", "l.ron"];
         desk.meshmill(&arguments).assert().success();
-        let lock = fs::read_to_string(desk.path("l.ron")).unwrap();
+        let lock = desk.text("l.ron");
         // As if the other machine had found a slightly better mesh.
         let digits = lock.split("\"min-stretch\": Number(").nth(1).unwrap().split(')').next().unwrap().to_owned();
         let nearby = (digits.parse::<f64>().unwrap() * 1.001).to_string();
-        fs::write(desk.path("l.ron"), lock.replace(&digits, &nearby)).unwrap();
+        desk.write("l.ron", &lock.replace(&digits, &nearby));
         desk.meshmill(&["run", "recipe.toml", "-q", "--locked=l.ron"]).assert().code(code);
     }
     // Nothing is locked where a gate fails.
@@ -147,7 +133,7 @@ fn init_writes_a_recipe_that_is_right() {
     let desk = Desk::new();
     fs::create_dir(desk.path("sub")).unwrap();
     desk.meshmill(&["init", "cube.obj", "--out", "sub/first.toml"]).assert().success();
-    let text = fs::read_to_string(desk.path("sub/first.toml")).unwrap();
+    let text = desk.text("sub/first.toml");
     assert!(text.contains("part = \"../cube.obj\"") && text.contains("closed = true"), "{text}");
     desk.meshmill(&["check", "sub/first.toml"])
         .assert()
@@ -189,9 +175,9 @@ fn init_looks_at_the_mesh_as_the_recipe_will() {
     let loose = CUBE.replace("f 5 6 7\nf 5 7 8\n", "f 9 10 11\nf 9 11 12\n");
     let top = "v 0 0 1.0000001\nv 1 0 1.0000001\nv 1 1 1.0000001\nv 0 1 1.0000001\n";
     let (points, faces) = loose.split_at(loose.find("f ").unwrap());
-    fs::write(desk.path("loose.obj"), format!("{points}{top}{faces}")).unwrap();
+    desk.write("loose.obj", &format!("{points}{top}{faces}"));
     desk.meshmill(&["init", "loose.obj"]).assert().success();
-    let text = fs::read_to_string(desk.path("loose.toml")).unwrap();
+    let text = desk.text("loose.toml");
     for found in ["# - 12 faces, 12 vertices, 1 body", "# - closed", "\nclosed = true", "4 vertices lie on others"] {
         assert!(text.contains(found), "{found}: {text}");
     }
@@ -205,12 +191,12 @@ fn a_search_finds_the_limit_and_writes_the_best_recipe() {
         "use = \"refine\"\nfrom = \"clean\"\nmax-edge = \"=size\"",
     );
     let recipe = recipe.replace("times = 1\n", "size = \"20%\"\n");
-    fs::write(desk.path("recipe.toml"), recipe).unwrap();
+    desk.write("recipe.toml", &recipe);
     let goal = "min faces where max-size <= 0.3";
     let arguments = ["sweep", "recipe.toml", "--goal", goal, "--vary", "size=5%..80%", "--evaluations", "8"];
     let search = desk.meshmill(&arguments).assert().success();
     search.stderr(predicate::str::contains("best of")).stdout(predicate::str::contains("best.toml"));
-    let best = fs::read_to_string(desk.path("out/part-goal/best.toml")).unwrap();
+    let best = desk.text("out/part-goal/best.toml");
     desk.meshmill(&["run", "out/part-goal/best.toml", "--out", "best"]).assert().success();
     let mut rows = csv::Reader::from_path(desk.path("out/part-goal/sweep.csv")).unwrap();
     let rows: Vec<csv::StringRecord> = rows.records().collect::<Result<_, _>>().unwrap();
@@ -270,7 +256,7 @@ fn a_watched_recipe_runs_again_when_its_input_changes() {
     let desk = Desk::new();
     let log = fs::File::create(desk.path("log")).unwrap();
     let mut child = std::process::Command::new(assert_cmd::cargo::cargo_bin!("meshmill"))
-        .current_dir(desk.folder.path())
+        .current_dir(desk.path(""))
         .env("MESHMILL_CACHE", desk.path("cache"))
         .args(["watch", "recipe.toml"])
         .stdout(Stdio::null())
@@ -282,13 +268,13 @@ fn a_watched_recipe_runs_again_when_its_input_changes() {
     let result = desk.path("out/part/result.stl");
     let first = wait_for(&|| times() == 1);
     let before = size(&result);
-    fs::write(desk.path("recipe.toml"), RECIPE.replace("times = 1", "times = 2")).unwrap();
+    desk.write("recipe.toml", &RECIPE.replace("times = 1", "times = 2"));
     let second = wait_for(&|| times() == 2);
     let after = size(&result);
-    fs::write(desk.path("cube.obj"), CUBE.replace("v 0 1 1", "v 0 1 3")).unwrap();
+    desk.write("cube.obj", &CUBE.replace("v 0 1 1", "v 0 1 3"));
     let third = wait_for(&|| times() == 3);
     child.kill().unwrap();
     child.wait().unwrap();
-    assert!(first && second && third, "{}", fs::read_to_string(desk.path("log")).unwrap());
+    assert!(first && second && third, "{}", desk.text("log"));
     assert!(after > 3 * before, "{before} {after}");
 }

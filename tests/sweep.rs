@@ -1,12 +1,17 @@
 //! `meshmill sweep` as people use it: shared work, tables, failed cases, interrupted and simultaneous sweeps.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Child, Stdio};
 use std::time::{Duration, Instant};
 
 use assert_cmd::Command;
 use predicates::prelude::*;
+
+#[path = "common/desk.rs"]
+mod desk;
+
+use desk::Desk;
 
 /// Three parameters: one upstream of everything that is slow, one in the middle, one in the gate only.
 const RECIPE: &str = r#"
@@ -40,35 +45,22 @@ times = [1, 2, 3]
 limit = [0.1, 0.2]
 "#;
 
-const CUBE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1\n\
-    f 1 3 2\nf 1 4 3\nf 5 6 7\nf 5 7 8\nf 1 2 6\nf 1 6 5\nf 2 3 7\nf 2 7 6\nf 3 4 8\nf 3 8 7\nf 4 1 5\nf 4 5 8\n";
-
-struct Desk {
-    folder: tempfile::TempDir,
-}
+const CUBE: &str = include_str!("common/cube.obj");
 
 impl Desk {
     fn new() -> Self {
-        let folder = tempfile::tempdir().unwrap();
-        fs::write(folder.path().join("recipe.toml"), RECIPE).unwrap();
-        fs::write(folder.path().join("cube.obj"), CUBE).unwrap();
-        Self { folder }
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.folder.path().join(name)
+        Self::with(&[("recipe.toml", RECIPE), ("cube.obj", CUBE)])
     }
 
     fn sweep(&self, arguments: &[&str]) -> Command {
-        let mut command = Command::new(assert_cmd::cargo::cargo_bin!("meshmill"));
-        command.current_dir(self.folder.path()).env("MESHMILL_CACHE", self.path("cache"));
-        command.args(["sweep", "recipe.toml"]).args(arguments);
+        let mut command = self.meshmill(&["sweep", "recipe.toml"]);
+        command.args(arguments);
         command
     }
 
     fn start(&self, out: &str) -> Child {
         std::process::Command::new(assert_cmd::cargo::cargo_bin!("meshmill"))
-            .current_dir(self.folder.path())
+            .current_dir(self.path(""))
             .env("MESHMILL_CACHE", self.path("cache"))
             .args(["sweep", "recipe.toml", "-q", "-s", "times=1,2,3,4,5", "--out", out])
             .stdout(Stdio::null())
@@ -84,7 +76,7 @@ impl Desk {
 
     /// How many tasks of each kind ran, as run.ron tells.
     fn ran(&self, out: &str) -> String {
-        let text = fs::read_to_string(self.path(out).join("run.ron")).unwrap();
+        let text = self.text(&format!("{out}/run.ron"));
         let ran = text.split("ran: {").nth(1).unwrap().split('}').next().unwrap();
         ran.split_whitespace().collect()
     }
@@ -126,7 +118,7 @@ fn cases_share_what_they_have_in_common_and_a_second_sweep_does_nothing() {
     desk.sweep(&["-q"]).assert().success();
     assert_eq!(desk.ran("out/study-sweep"), "");
     assert_eq!(contents(&desk.path("out/study-sweep")), before);
-    let ron = fs::read_to_string(desk.path("out/study-sweep/sweep.ron")).unwrap();
+    let ron = desk.text("out/study-sweep/sweep.ron");
     let table: meshmill::report::sweep::SweepTable = ron::from_str(&ron).unwrap();
     assert_eq!((table.rows.len(), table.parameters), (6, vec!["times".to_owned(), "limit".to_owned()]));
 }
@@ -134,7 +126,7 @@ fn cases_share_what_they_have_in_common_and_a_second_sweep_does_nothing() {
 #[test]
 fn a_failed_case_is_a_row_with_its_reason_and_the_others_go_on() {
     let desk = Desk::new();
-    fs::write(desk.path("broken.obj"), "v 0 0 0\nf 1 2 3\n").unwrap();
+    desk.write("broken.obj", "v 0 0 0\nf 1 2 3\n");
     let arguments = ["-s", "part=cube.obj,broken.obj", "-s", "times=1", "-s", "limit=0.1,0.99"];
     let swept = desk.sweep(&arguments).assert().code(4);
     swept.stderr(predicate::str::contains("broken").and(predicate::str::contains("1 of 4 cases passed")));
@@ -154,7 +146,7 @@ fn a_failed_case_is_a_row_with_its_reason_and_the_others_go_on() {
 fn tables_go_to_stdout_as_csv_and_json() {
     let desk = Desk::new();
     let csv = desk.sweep(&["--csv"]).assert().success().get_output().stdout.clone();
-    assert_eq!(String::from_utf8(csv).unwrap(), fs::read_to_string(desk.path("out/study-sweep/sweep.csv")).unwrap());
+    assert_eq!(String::from_utf8(csv).unwrap(), desk.text("out/study-sweep/sweep.csv"));
     let json = desk.sweep(&["--json"]).assert().success().get_output().stdout.clone();
     let table: serde_json::Value = serde_json::from_slice(&json).unwrap();
     assert_eq!(table["rows"][0]["state"], "passed");

@@ -1,11 +1,14 @@
 //! What the command says to somebody who got something a little wrong, and where: each trap that was met on real parts.
 
 use std::fs;
-use std::path::PathBuf;
 
-use assert_cmd::Command;
 use predicates::prelude::*;
 use predicates::str::contains;
+
+#[path = "common/desk.rs"]
+mod desk;
+
+use desk::Desk;
 
 /// A box of two groups, `bottom` and the rest.
 const PART: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1\n\
@@ -37,30 +40,9 @@ keep = ["rest"]
 fe = ["result.vtu"]
 "#;
 
-struct Desk {
-    folder: tempfile::TempDir,
-}
-
 impl Desk {
     fn new() -> Self {
-        let desk = Self { folder: tempfile::tempdir().unwrap() };
-        desk.write("part.obj", PART);
-        desk.write("recipe.toml", RECIPE);
-        desk
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.folder.path().join(name)
-    }
-
-    fn write(&self, name: &str, text: &str) {
-        fs::write(self.path(name), text).unwrap();
-    }
-
-    fn meshmill(&self, arguments: &[&str]) -> Command {
-        let mut command = Command::new(assert_cmd::cargo::cargo_bin!("meshmill"));
-        command.current_dir(self.folder.path()).env("MESHMILL_CACHE", self.path("cache")).args(arguments);
-        command
+        Self::with(&[("part.obj", PART), ("recipe.toml", RECIPE)])
     }
 
     /// What a command that ends with this code says to stderr.
@@ -199,7 +181,7 @@ fn advice(desk: &Desk, recipe: &str) -> String {
     let told = desk.told(&["run", "recipe.toml", "--report"], 3);
     let json = desk.meshmill(&["run", "recipe.toml", "--json"]).assert().code(3).get_output().stdout.clone();
     let json = String::from_utf8(json).unwrap();
-    let page = fs::read_to_string(desk.path("out/part/report.html")).unwrap();
+    let page = desk.text("out/part/report.html");
     let tried: Vec<&str> = told.lines().filter_map(|line| line.trim().strip_prefix("try: ")).collect();
     for line in &tried {
         let parts: Vec<&str> = line.split(": ").collect();
