@@ -13,11 +13,13 @@ import os
 import subprocess
 import sys
 import tempfile
-import venv
 from collections import Counter
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT / "examples" / "compare"))
+import environment  # noqa: E402
+
 PACKAGES = ["meshio==5.3.5", "gmsh==4.15.2", "vtk==9.7.2"]
 
 # A box. Its sides are in no group, its bottom and its top are.
@@ -118,25 +120,6 @@ GROUPS_OF = {
     "vtk": {"vtu", "vtp", "vtk"},
 }
 FIELDS_OF = {"meshio": {"vtu", "vtk", "msh", "msh2"}, "gmsh": {"msh", "msh2"}, "vtk": {"vtu", "vtp", "vtk"}}
-
-
-def enter_environment():
-    """Goes on in the virtual environment with the readers; makes it first where it is not there."""
-    home = Path(os.environ.get("MESHMILL_READERS_VENV", ROOT / "target" / "readers" / "venv"))
-    if Path(sys.prefix).resolve() == home.resolve():
-        return
-    python = home / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
-    if not python.exists():
-        try:
-            venv.create(home, with_pip=True)
-        except (OSError, subprocess.CalledProcessError) as error:
-            print("SKIPPED: no virtual environment can be made here (apt-get install python3-venv):", error)
-            sys.exit(0)
-    pip = [str(python), "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
-    for package in PACKAGES:
-        if subprocess.run([*pip, package]).returncode != 0:
-            print(f"SKIPPED: {package} cannot be installed here (no network, or no wheel for this platform)")
-    os.execv(python, [str(python), *sys.argv])
 
 
 def read_meshio(file):
@@ -266,5 +249,5 @@ def main():
 
 
 if __name__ == "__main__":
-    enter_environment()
+    environment.enter(os.environ.get("MESHMILL_READERS_VENV", ROOT / "target" / "readers" / "venv"), [[name] for name in PACKAGES])
     sys.exit(main())

@@ -17,8 +17,9 @@ import resource
 import statistics
 import subprocess
 import sys
-import venv
 from pathlib import Path
+
+import environment
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
@@ -44,28 +45,10 @@ def arguments():
 
 
 def enter_environment():
-    """Goes on in the virtual environment with the peers; makes it first where it is not there."""
-    home = Path(os.environ.get("MESHMILL_COMPARE_VENV", WORK / "venv"))
-    if Path(sys.prefix).resolve() == home.resolve():
-        return
-    python = home / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
-    if not python.exists():
-        try:
-            venv.create(home, with_pip=True)
-        except (OSError, subprocess.CalledProcessError) as error:
-            print("SKIPPED: no virtual environment can be made here (apt-get install python3-venv):", error)
-            sys.exit(0 if "--small" in sys.argv else 1)
-    pip = [str(python), "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
-    if subprocess.run([*pip, "-r", str(HERE / "requirements.txt")]).returncode != 0:
-        print("SKIPPED: the peers cannot be installed here (no network, or no wheels for this platform)")
-        sys.exit(0 if "--small" in sys.argv else 1)
-    # Open3D is linked to libraries that a bare server has not.
-    loaded = subprocess.run([python, "-c", "import open3d, pymeshlab, fast_simplification"], capture_output=True, text=True)
-    if loaded.returncode != 0:
-        print("SKIPPED: a peer does not load (apt-get install libusb-1.0-0 libgl1 libgomp1):",
-              loaded.stderr.strip().splitlines()[-1])
-        sys.exit(0 if "--small" in sys.argv else 1)
-    os.execv(python, [str(python), *sys.argv])
+    """Goes on in the virtual environment with the peers."""
+    home = os.environ.get("MESHMILL_COMPARE_VENV", WORK / "venv")
+    installs = [["-r", str(HERE / "requirements.txt")]]
+    environment.enter(home, installs, "open3d, pymeshlab, fast_simplification", may_skip="--small" in sys.argv)
 
 
 def peer(name, task, source, target, number=""):
