@@ -2,7 +2,6 @@
 
 use glam::DVec3;
 use meshmill::mesh::{Facet, Soup, Surface, VertexId};
-use meshmill::step::Length;
 use meshmill::steps::repair::{RepairError, RepairParams, RepairStats, repair};
 use meshmill::watch::Watch;
 
@@ -435,54 +434,4 @@ fn break_it(mut soup: Soup, kind: u8, i: usize, j: usize) -> Soup {
     }
     soup.faces = faces.into();
     soup
-}
-
-/// A soup times a number, moved.
-fn placed(soup: Soup, scale: f64, offset: f64) -> Soup {
-    Soup { points: soup.points.iter().map(|&p| scale * p + DVec3::splat(offset)).collect(), ..soup }
-}
-
-fn refused(soup: &Soup, params: &RepairParams) -> RepairError {
-    repair(soup, params, &Watch::silent()).map(drop).expect_err("it is repaired")
-}
-
-#[test]
-fn what_arithmetic_cannot_hold_is_refused_with_extent_and_offset() {
-    for (scale, offset) in [(1e-150, 0.0), (1e160, 0.0), (1.0, 1e15), (1e-40, 0.0), (1e-3, 1e9)] {
-        let error = refused(&placed(cube([0.0; 3]), scale, offset), &RepairParams::default());
-        let RepairError::BeyondArithmetic { extent, offset: far } = error else { panic!("{error}") };
-        assert!(extent > 0.0 && far >= offset, "{extent} {far}");
-        assert!(error.to_string().contains("extent") && error.to_string().contains("origin"), "{error}");
-    }
-    for (scale, offset) in [(1e-6, 0.0), (1e9, 0.0), (1.0, 1e8), (1e3, 1e6)] {
-        run(&placed(cube([0.0; 3]), scale, offset));
-    }
-}
-
-#[test]
-fn faces_on_one_line_are_no_surface() {
-    let points: Vec<[f64; 3]> = (0..10).map(|i| [1.0, 2.0, 3.0].map(|x| x * f64::from(i))).collect();
-    let faces: Vec<[u32; 3]> = (0..20).map(|i| [i % 10, (3 * i + 1) % 10, (7 * i + 4) % 10]).collect();
-    let error = refused(&soup(&points, &faces), &RepairParams::default());
-    assert!(matches!(error, RepairError::NoArea { .. } | RepairError::NothingLeft { .. }), "{error}");
-}
-
-#[test]
-fn bodies_that_run_through_each_other_stop_before_they_are_refined() {
-    let sized = |percent| RepairParams { crossing_size: Some(Length::Percent(percent)), ..RepairParams::default() };
-    let through = merged(cube([0.0; 3]), &cube([0.4, 0.3, 0.5]));
-    let error = refused(&through, &sized(2.0));
-    let RepairError::RunsThrough { pairs, expected, ref worst, .. } = error else { panic!("{error}") };
-    assert!(expected > 2 * pairs && !worst.is_empty(), "{error}");
-    // Every face named is one of those that cross, and the place lies on both cubes.
-    for (_, at) in worst {
-        let on = |low: [f64; 3]| (*at - DVec3::from_array(low) - DVec3::splat(0.5)).abs().max_element();
-        assert!((on([0.0; 3]) - 0.5).abs() < 1e-9 && (on([0.4, 0.3, 0.5]) - 0.5).abs() < 1e-9, "{at}");
-    }
-    for params in [RepairParams::default(), sized(100.0)] {
-        let (_, stats) = run_with(&through, &params);
-        assert_eq!(stats.self_intersections, pairs);
-    }
-    // Where lines are shorter than elements, as in scans, they do not spread.
-    run_with(&merged(cube([0.0; 3]), &cube([0.99, 0.99, 0.99])), &sized(2.0));
 }

@@ -48,30 +48,73 @@ impl Crossings {
 pub fn compare(subject: &Subject<'_>, reference: &Subject<'_>) -> Crossings {
     let (ours, theirs) = (places(subject), places(reference));
     let apart = APART * reference.extent().bounds.diagonal();
-    let fan = |place: &Place| {
-        let corners = place.corners.clone();
-        let last = corners.len() - 1;
-        // A segment is a triangle with a corner twice.
-        (1..last.max(2)).map(move |at| [corners[0], corners[at.min(last)], corners[(at + 1).min(last)]])
-    };
-    let old = TriangleBvh::new(theirs.iter().flat_map(fan).collect());
+    let old = TriangleBvh::new(theirs.iter().flat_map(|place| place.common.fan()).collect());
     let is_old = |&p: &DVec3| old.closest_within(p, apart * apart).is_some();
-    let new = ours.iter().filter(|place| !place.corners.iter().all(is_old));
+    let new = ours.iter().filter(|place| !place.common.corners.iter().all(is_old));
     let mut elsewhere: Vec<FaceId> = new.flat_map(|place| place.faces).collect();
     elsewhere.sort_unstable();
     elsewhere.dedup();
-    let sum = |places: &[Place]| places.iter().map(|place| place.length).sum::<f64>();
+    let sum = |places: &[Place]| places.iter().map(|place| place.common.length()).sum::<f64>();
     let reference_length = sum(&theirs);
     Crossings { elsewhere, length: sum(&ours), reference_length, longest: LONGER * reference_length + apart }
+}
+
+/// What two triangles that meet have in common.
+#[derive(Clone, Debug)]
+pub struct Common {
+    /// Corners of a segment or a convex polygon; at least one.
+    corners: Vec<DVec3>,
+    /// Whether the triangles lie in one plane.
+    is_flat: bool,
+}
+
+impl Common {
+    /// Of triangles that are known to meet.
+    pub fn of(ours: [DVec3; 3], theirs: [DVec3; 3]) -> Self {
+        let normal = area_vector(theirs).normalize_or_zero();
+        let heights = ours.map(|p| normal.dot(p - theirs[0]));
+        let size = ours.iter().chain(&theirs).map(|p| p.distance(ours[0])).fold(0.0, f64::max);
+        let is_flat = heights.iter().all(|height| height.abs() <= 1e-9 * size);
+        let mut corners = if is_flat { ours.to_vec() } else { section(ours, heights) };
+        for side in 0..3 {
+            let (from, to) = (theirs[side], theirs[(side + 1) % 3]);
+            let inward = normal.cross(to - from).normalize_or_zero();
+            corners = clipped(&corners, |p| inward.dot(p - from) + 1e-9 * size);
+        }
+        if corners.is_empty() {
+            // They meet in so little that rounding lost it.
+            corners = vec![closest_on_triangle(ours[0], theirs).point];
+        }
+        Self { corners, is_flat }
+    }
+
+    /// Triangles that cover it; a segment is a triangle with a corner twice.
+    fn fan(&self) -> impl Iterator<Item = [DVec3; 3]> {
+        let last = self.corners.len() - 1;
+        (1..last.max(2)).map(move |at| [0, at.min(last), (at + 1).min(last)].map(|corner| self.corners[corner]))
+    }
+
+    /// Length of the segment along which they cross; 0 where they lie in one plane.
+    pub fn length(&self) -> f64 {
+        let others = |a: &DVec3| self.corners.iter().map(|b| a.distance(*b)).fold(0.0, f64::max);
+        if self.is_flat { 0.0 } else { self.corners.iter().map(others).fold(0.0, f64::max) }
+    }
+
+    /// Area of the polygon in which they lie on each other; 0 where they cross.
+    pub fn area(&self) -> f64 {
+        if self.is_flat { 0.5 * self.fan().map(area_vector).sum::<DVec3>().length() } else { 0.0 }
+    }
+
+    /// The mean of its corners.
+    pub fn middle(&self) -> DVec3 {
+        self.corners.iter().sum::<DVec3>() / self.corners.len() as f64
+    }
 }
 
 /// Where two faces meet.
 struct Place {
     faces: [FaceId; 2],
-    /// Corners of a segment or a convex polygon; at least one.
-    corners: Vec<DVec3>,
-    /// Length of the segment; 0 of a polygon.
-    length: f64,
+    common: Common,
 }
 
 fn places(subject: &Subject<'_>) -> Vec<Place> {
@@ -88,33 +131,12 @@ fn places(subject: &Subject<'_>) -> Vec<Place> {
         for &ours in triangles(a) {
             for &theirs in triangles(b) {
                 if triangle_triangle(ours, theirs).is_intersection() {
-                    found.push(place([a, b], ours, theirs));
+                    found.push(Place { faces: [a, b], common: Common::of(ours, theirs) });
                 }
             }
         }
     }
     found
-}
-
-fn place(faces: [FaceId; 2], ours: [DVec3; 3], theirs: [DVec3; 3]) -> Place {
-    let normal = area_vector(theirs).normalize_or_zero();
-    let heights = ours.map(|p| normal.dot(p - theirs[0]));
-    let size = ours.iter().chain(&theirs).map(|p| p.distance(ours[0])).fold(0.0, f64::max);
-    let is_flat = heights.iter().all(|height| height.abs() <= 1e-9 * size);
-    let mut corners = if is_flat { ours.to_vec() } else { section(ours, heights) };
-    for side in 0..3 {
-        let (from, to) = (theirs[side], theirs[(side + 1) % 3]);
-        let inward = normal.cross(to - from).normalize_or_zero();
-        corners = clipped(&corners, |p| inward.dot(p - from) + 1e-9 * size);
-    }
-    if corners.is_empty() {
-        // They meet in so little that rounding lost it.
-        corners = vec![closest_on_triangle(ours[0], theirs).point];
-    }
-    let length =
-        |corners: &[DVec3]| corners.iter().flat_map(|a| corners.iter().map(|b| a.distance(*b))).fold(0.0, f64::max);
-    let length = if is_flat { 0.0 } else { length(&corners) };
-    Place { faces, corners, length }
 }
 
 /// Where a triangle passes through a plane, from the heights of its corners over that.

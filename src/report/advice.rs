@@ -153,7 +153,7 @@ impl Chain<'_> {
                 step.name
             ));
         }
-        self.turn("lower", &["tolerance"])
+        self.turn("lower", &["tolerance", "weld"])
     }
 
     fn holes(&self) -> Option<String> {

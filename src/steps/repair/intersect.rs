@@ -10,6 +10,7 @@ use super::report::RepairError;
 use crate::mesh::FaceId;
 use crate::mesh::meetings::meetings;
 use crate::mesh::predicate::{Meeting, triangle_triangle};
+use crate::metric::crossing::Common;
 use crate::watch::{Cancelled, Watch};
 
 /// How many faces are listed.
@@ -28,67 +29,30 @@ pub(super) struct Intersections {
 }
 
 impl Intersections {
-    /// Refuses faces that run through each other along so much that elements of `size` would do so in more than twice
-    /// as many places. Two faces meet along a line, or cover each other.
-    pub(super) fn spread(&self, size: f64, corners: impl Fn(FaceId) -> [DVec3; 3]) -> Result<(), RepairError> {
-        let (mut expected, mut length) = (0.0, 0.0);
-        let mut lines: Vec<(f64, u32, DVec3)> = Vec::new();
-        for &(i, j, meeting) in &self.met {
+    /// Refuses faces that run through each other along more than `longest` in all. Faces that lie on each other count
+    /// with the area that they share, over `diagonal`, so that the sum does not depend on how finely they are cut.
+    pub(super) fn check_length(
+        &self,
+        (longest, diagonal): (f64, f64),
+        corners: impl Fn(FaceId) -> [DVec3; 3],
+    ) -> Result<(), RepairError> {
+        let mut length = 0.0;
+        let mut places: Vec<(f64, u32, DVec3)> = Vec::new();
+        for &(i, j, _) in &self.met {
             let [a, b] = [i, j].map(|f| corners(FaceId::from_raw(f)));
-            let (long, middle) = common_line(a, b);
-            let elements = (long / size).floor();
-            expected += match meeting {
-                Meeting::Overlapping => (elements * elements).max(1.0),
-                _ => elements.max(1.0),
-            };
-            length += long;
-            lines.push((long, i, middle));
+            let common = Common::of(a, b);
+            let extent = common.length() + common.area() / diagonal;
+            length += extent;
+            places.push((extent, i, common.middle()));
         }
-        if expected <= 2.0 * self.met.len() as f64 {
+        if length <= longest {
             return Ok(());
         }
-        lines.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-        lines.dedup_by_key(|line| line.1);
-        let worst = lines.into_iter().take(LISTED).map(|(_, face, at)| (face, at)).collect();
-        Err(RepairError::RunsThrough { pairs: self.pairs, length, size, expected: expected as u64, worst })
+        places.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        places.dedup_by_key(|place| place.1);
+        let worst = places.into_iter().take(LISTED).map(|(_, face, at)| (face, at)).collect();
+        Err(RepairError::RunsThrough { pairs: self.pairs, length, longest, worst })
     }
-}
-
-/// Length and middle of the line along which two triangles meet; for triangles in one plane, those of the box that they
-/// have in common.
-fn common_line(a: [DVec3; 3], b: [DVec3; 3]) -> (f64, DVec3) {
-    let along = normal(a).cross(normal(b)).normalize_or_zero();
-    let [(low, high), (from, to)] = [(a, b), (b, a)].map(|(t, other)| passage(t, other, a[0], along));
-    let (start, end) = (if low.0 > from.0 { low } else { from }, if high.0 < to.0 { high } else { to });
-    let line = end.0 - start.0;
-    if along != DVec3::ZERO && line.is_finite() {
-        return (line.max(0.0), 0.5 * (start.1 + end.1));
-    }
-    let [low, high] = [(a, b), (b, a)].map(|(t, _)| (t[0].min(t[1]).min(t[2]), t[0].max(t[1]).max(t[2])));
-    let (min, max) = (low.0.max(high.0), low.1.min(high.1));
-    ((max - min).max(DVec3::ZERO).length(), 0.5 * (min + max))
-}
-
-/// A point of a line, with its position along it.
-type Mark = (f64, DVec3);
-
-/// The first and the last point along a direction where a triangle passes the plane of another.
-fn passage(t: [DVec3; 3], plane: [DVec3; 3], origin: DVec3, along: DVec3) -> (Mark, Mark) {
-    let up = normal(plane);
-    let height = t.map(|p| up.dot(p - plane[0]));
-    let nowhere = DVec3::NAN;
-    let (mut low, mut high) = ((f64::INFINITY, nowhere), (f64::NEG_INFINITY, nowhere));
-    for i in 0..3 {
-        let j = (i + 1) % 3;
-        if (height[i] > 0.0) == (height[j] > 0.0) && height[i] != 0.0 && height[j] != 0.0 {
-            continue;
-        }
-        let share = if height[i] == height[j] { 0.0 } else { height[i] / (height[i] - height[j]) };
-        let at = t[i].lerp(t[j], share.clamp(0.0, 1.0));
-        let mark = (along.dot(at - origin), at);
-        (low, high) = (if mark.0 < low.0 { mark } else { low }, if mark.0 > high.0 { mark } else { high });
-    }
-    (low, high)
 }
 
 /// Counts the pairs, as far as [`meetings`] goes.

@@ -83,8 +83,8 @@ pub fn repair(soup: &Soup, params: &RepairParams, watch: &Watch) -> Result<(Surf
     if stats.degenerate_faces_left as usize == surface.faces.len() {
         return Err(RepairError::NoArea { faces: surface.faces.len() });
     }
-    let crossing_size = params.crossing_size.map(|size| size.resolve(diagonal));
-    count_intersections(&surface, soup, crossing_size, &mut stats, watch)?;
+    let longest = params.crossing_length.map(|length| (length.resolve(diagonal), diagonal));
+    count_intersections(&surface, soup, longest, &mut stats, watch)?;
     stats.warnings = stats.taken_away().into_iter().chain(near::beside_each_other(&surface)).collect();
     Ok((surface, stats))
 }
@@ -298,13 +298,13 @@ fn check_result(draft: &Draft, stats: &RepairStats, limit: f64) -> Result<(), Re
 fn count_intersections(
     surface: &Surface,
     soup: &Soup,
-    crossing_size: Option<f64>,
+    longest: Option<(f64, f64)>,
     stats: &mut RepairStats,
     watch: &Watch,
 ) -> Result<(), RepairError> {
     let after = intersect::self_intersections(surface.faces.len(), |f| surface.corners(f), watch)?;
-    if let Some(size) = crossing_size {
-        after.spread(size, |f| surface.corners(f))?;
+    if let Some(longest) = longest {
+        after.check_length(longest, |f| surface.corners(f))?;
     }
     let changes = stats.vertices_welded + stats.t_junctions + stats.edges_collapsed + stats.edges_flipped;
     let dropped = stats.repeated_faces + stats.cancelled_faces + stats.slivers_dropped + stats.components_dropped;

@@ -28,11 +28,11 @@ pub struct RepairParams {
     pub non_manifold: NonManifold,
     /// What becomes of faces that run through each other: `"report"` (default) counts them.
     pub self_intersections: SelfIntersections,
-    /// Edge length of the elements that later steps make. Where faces of the result run through each other along
-    /// more than that, smaller elements run through each other in ever more places: repair then fails and says where,
-    /// before any other work is done. A few small crossings, as of scans, pass. Length; default: not looked at.
+    /// Along how much, in all, faces of the result may run through each other; faces that lie on each other count with
+    /// the area that they share over the diagonal. Where it is more, no finer mesh keeps to the same crossings: repair
+    /// then fails and says where, before any other work is done. Length; default: not looked at.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub crossing_size: Option<Length>,
+    pub crossing_length: Option<Length>,
     /// The surface moves no further than this outside filled holes, by all corrections together. Length; default: the
     /// weld length.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -47,7 +47,7 @@ impl Default for RepairParams {
             keep_components: KeepComponents::All,
             non_manifold: NonManifold::Cut,
             self_intersections: SelfIntersections::Report,
-            crossing_size: None,
+            crossing_length: None,
             max_move: None,
         }
     }

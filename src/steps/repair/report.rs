@@ -237,21 +237,19 @@ pub enum RepairError {
     },
     /// Bodies run through each other.
     #[error(
-        "faces run through each other in {pairs} places, along {} in all, so that this is no solid: elements with edges of \
-         {} would do so in about {expected} places",
+        "faces run through each other in {pairs} places, along {} in all, more than `crossing-length` = {}: this is no \
+         solid, and no finer mesh would keep to the same crossings",
         number_text(*.length),
-        number_text(*.size)
+        number_text(*.longest)
     )]
     RunsThrough {
         /// Pairs of faces.
         pairs: u64,
         /// Length of all intersections.
         length: f64,
-        /// The edge length asked for.
-        size: f64,
-        /// Pairs of such elements.
-        expected: u64,
-        /// The faces that meet along the longest lines, and the middle of these.
+        /// The length allowed.
+        longest: f64,
+        /// The faces that have most in common with others, and the middle of that.
         worst: Vec<(u32, DVec3)>,
     },
     /// A corner names a vertex that does not exist, or a coordinate is not finite.
@@ -294,7 +292,7 @@ impl From<RepairError> for StepFailure {
             RepairError::RunsThrough { worst, .. } => Self::failed(message)
                 .with_help(
                     "join the bodies in the program that made them, or mesh each by itself; \
-                     `crossing-size` = \"100%\" lets them through, and gates see to it that they cross nowhere else",
+                     a larger `crossing-length` lets them through, and gates see to it that they cross nowhere else",
                 )
                 .with_elements(worst.into_iter().map(|(f, at)| element(FaceId::from_raw(f), Some(at))).collect()),
             RepairError::BadFace { face } => Self::bad_input(message).with_elements(vec![element(face, None)]),
