@@ -4,6 +4,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
+#[path = "tidy/circles.rs"]
+mod circles;
+
 /// Which top-level modules each may import. `watch` and `terminal` are open to all.
 const LAYERS: &[(&str, &[&str])] = &[
     ("watch", &[]),

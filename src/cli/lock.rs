@@ -1,20 +1,18 @@
 //! `meshmill lock`: what a recipe was made of and what it gave, as a file that `run --locked` is held against.
 
-use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::ValueEnum;
 
 use super::Global;
-use super::context::{Planned, RecipeArguments, lock_file, open_store};
+use super::context::{RecipeArguments, lock_file, open_store};
 use super::exit::{Exit, Fault, say};
 use super::picture::Pictures;
 use super::run::{Ran, execute, options, tell};
 use super::signals::Interrupt;
+use crate::report::Status;
 use crate::report::lock::{Class, Lock, ingredients};
-use crate::report::{Report, Status};
-use crate::run::{self, RunOptions};
-use crate::store::Store;
+use crate::run;
 
 /// Run a recipe and lock it: `run --locked` then fails with 5 when anything differs.
 ///
@@ -81,43 +79,4 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Fault>
         say(&format!("{}: locked {} tasks and {} files", file.display(), lock.tasks.len(), lock.files.len()));
     }
     Ok(Exit::Done)
-}
-
-/// A lock that a run is held against.
-pub(super) struct Held {
-    file: PathBuf,
-    lock: Lock,
-    now: Lock,
-}
-
-impl Held {
-    /// Reads the lock, the usual one where `file` is empty, and fails when the run would not be of what was locked.
-    pub(super) fn new(file: &Path, planned: &Planned, store: &Store, options: &RunOptions) -> Result<Self, Fault> {
-        let file = if file.as_os_str().is_empty() { lock_file(&planned.recipe) } else { file.to_path_buf() };
-        let text = fs::read_to_string(&file).map_err(|error| {
-            Fault::usage(format!("cannot read the lock {}: {error}", file.display())).help("`meshmill lock` writes one")
-        })?;
-        let lock = Lock::from_ron(&text)
-            .map_err(|error| Fault::usage(format!("{} is not a lock of this version: {error}", file.display())))?;
-        let now = ingredients(&planned.recipe.name, &planned.plan, &run::records(&planned.plan, store, options));
-        let held = Self { file, lock, now };
-        held.differs(held.lock.changed_ingredients(&held.now), "nothing has run")?;
-        Ok(held)
-    }
-
-    /// Fails when the results are not those that were locked.
-    pub(super) fn check(self, report: &Report, out: &Path) -> Result<(), Fault> {
-        let now = self.now.clone().with_results(report, out);
-        self.differs(self.lock.changed_results(&now), "the files are those of this run")
-    }
-
-    fn differs(&self, lines: Vec<String>, state: &str) -> Result<(), Fault> {
-        if lines.is_empty() {
-            return Ok(());
-        }
-        let shown: Vec<String> = lines.iter().take(60).map(|line| format!("  {line}")).collect();
-        let more = if lines.len() > 60 { format!("\n  and {} more", lines.len() - 60) } else { String::new() };
-        let message = format!("this is not what {} locked; {state}\n{}{more}", self.file.display(), shown.join("\n"));
-        Err(Fault::new(Exit::Locked, message).help("take the change back, or lock anew with `meshmill lock`"))
-    }
 }

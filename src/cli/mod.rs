@@ -3,6 +3,7 @@
 //! Data goes to stdout, everything else to stderr. This is the only module that prints, that ends the process, and
 //! that decides which steps there are: it hands the catalog down.
 
+mod best;
 mod cache;
 mod check;
 mod completions;
@@ -12,6 +13,7 @@ mod diff;
 mod exit;
 mod goal;
 mod graph;
+mod held;
 mod init;
 mod lock;
 mod man;
@@ -19,12 +21,14 @@ mod measure;
 mod picture;
 mod plan;
 mod progress;
+mod record;
 mod report;
 mod run;
 mod schema;
 mod signals;
 mod steps;
 mod sweep;
+mod tables;
 mod trace;
 mod unchanged;
 mod watch;

@@ -8,9 +8,10 @@ use std::sync::Arc;
 use super::Global;
 use super::context::{Planned, RecipeArguments, open_store, protected};
 use super::exit::{Exit, Fault, coloured, data, document_text, say, say_failure};
-use super::lock::Held;
+use super::held::Held;
 use super::picture::{self, Pictures};
 use super::progress;
+use super::record::write_record;
 use super::report;
 use super::signals::Interrupt;
 use super::trace::Trace;
@@ -177,16 +178,21 @@ type Work<'a> = dyn Fn(&Arc<dyn Observer>) -> Result<RunOutcome, RunError> + 'a;
 /// Runs something under the observer that suits the terminal, with a timeline where one is asked for.
 pub(super) fn traced(trace: Option<&Path>, global: &Global, work: &Work<'_>) -> Result<RunOutcome, Fault> {
     let observer: Arc<dyn Observer> = progress::observer(global.quiet, global.verbose > 0);
-    let Some(path) = trace else { return Ok(tell_unsaved(work(&observer)?)) };
-    let trace = Arc::new(Trace::new(observer));
-    let observer = Arc::clone(&trace) as Arc<dyn Observer>;
-    let outcome = work(&observer)?;
-    trace.write(path)?;
-    Ok(tell_unsaved(outcome))
+    let outcome = match trace {
+        None => work(&observer)?,
+        Some(path) => {
+            let trace = Arc::new(Trace::new(observer));
+            let outcome = work(&(Arc::clone(&trace) as Arc<dyn Observer>))?;
+            trace.write(path)?;
+            outcome
+        }
+    };
+    tell_unsaved(&outcome);
+    Ok(outcome)
 }
 
 /// Tells what the cache could not take.
-pub(super) fn tell_unsaved(outcome: RunOutcome) -> RunOutcome {
+pub(super) fn tell_unsaved(outcome: &RunOutcome) {
     if let Some(reason) = &outcome.unsaved {
         say(&format!(
             "warning: the cache could not be written, so the next run computes some of this again, and pictures and \
@@ -194,7 +200,6 @@ pub(super) fn tell_unsaved(outcome: RunOutcome) -> RunOutcome {
              --cache DIR"
         ));
     }
-    outcome
 }
 
 /// The options of a run of this recipe.
@@ -237,15 +242,6 @@ pub(super) fn jobs_of(jobs: Option<usize>) -> Result<usize, Fault> {
         return Err(Fault::usage("--jobs 0: at least one task must run at a time"));
     }
     Ok(jobs.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, std::num::NonZero::get)))
-}
-
-pub(super) fn write_record(report: &Report, out: &Path) -> Result<(), Fault> {
-    Ok(run::write_file(&out.join("run.ron"), record_text(report)?.as_bytes())?)
-}
-
-/// What stands in `run.ron`.
-pub(super) fn record_text(report: &Report) -> Result<String, Fault> {
-    record::to_ron(report).map_err(|error| Fault::new(Exit::Fault, format!("cannot write run.ron: {error}")))
 }
 
 pub(super) fn tell(report: &Report, json: bool, quiet: bool) -> Result<(), Fault> {

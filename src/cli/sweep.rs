@@ -5,16 +5,17 @@ use std::sync::Arc;
 
 use super::Global;
 use super::context::{Planned, RecipeArguments, list_files, open_store, pair, plan_cases, protected};
-use super::exit::{Exit, Fault, data, document_text, say};
+use super::exit::{Exit, Fault, data, say};
 use super::picture::{self, Pictures};
-use super::run::{folder, jobs_of, left_out, path_bytes, traced, warnings, write_record};
+use super::record::write_record;
+use super::run::{folder, jobs_of, left_out, path_bytes, traced, warnings};
 use super::signals::Interrupt;
+use super::tables::{Form, table_text, write_tables};
 use super::unchanged::Unchanged;
 use super::{goal, progress, report};
 use crate::plan::sweep::sweep;
 use crate::recipe::Recipe;
 use crate::report::Report;
-use crate::report::json::Kind;
 use crate::report::sweep::{RowState, SweepTable};
 use crate::run::{self, RunOptions};
 use crate::store::stamp::Said;
@@ -42,7 +43,7 @@ pub(super) struct Arguments {
     /// Write `report.html` too: scatter with the Pareto front, parallel coordinates, a picture and the mesh of each
     /// case.
     #[arg(long)]
-    pub(super) report: bool,
+    report: bool,
     /// Print the table as one JSON document.
     #[arg(long, conflicts_with = "csv")]
     json: bool,
@@ -55,16 +56,8 @@ pub(super) struct Arguments {
     /// Write a timeline for a trace viewer.
     #[arg(long, value_name = "FILE", conflicts_with = "goal")]
     trace: Option<PathBuf>,
-    /// Search for the best values in the place of a grid: "min faces where min-stretch >= 0.3 and distance <= 0.2%".
-    /// The recipe's gates must hold too. The best recipe is written to `best.toml`.
-    #[arg(long, value_name = "GOAL", conflicts_with_all = ["axes", "list"])]
-    pub(super) goal: Option<String>,
-    /// A parameter that the search may change, and between which values: `size=1%..6%`.
-    #[arg(long, value_name = "NAME=FROM..TO", value_parser = pair, requires = "goal")]
-    pub(super) vary: Vec<(String, String)>,
-    /// How many cases the search may run.
-    #[arg(long, value_name = "N", default_value_t = 12, value_parser = clap::value_parser!(u32).range(1..=10_000))]
-    pub(super) evaluations: u32,
+    #[command(flatten)]
+    search: goal::Arguments,
 }
 
 pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Fault> {
@@ -76,11 +69,12 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Fault>
     }
     let recipe = arguments.recipe.load(&arguments.axes)?;
     let interrupt = Interrupt::listen();
-    if arguments.goal.is_some() {
+    if arguments.search.goal.is_some() {
         let (store, options) = (open_store(global)?, options(arguments, &recipe, &interrupt, "goal")?);
         let _claim = run::claim(&options.out)?;
         let observer = progress::observer(global.quiet, global.verbose > 0);
-        return goal::run(arguments, global, recipe, (&store, &options, observer), &interrupt);
+        let after = goal::After { form: arguments.form(), report: arguments.report, global, interrupt: &interrupt };
+        return goal::run(&arguments.search, recipe, (&store, &options, observer), &after);
     }
     let found = sweep(&recipe, &list_files)?;
     arguments.recipe.check_fixed(&found.varied)?;
@@ -127,9 +121,18 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Fault>
 }
 
 impl Arguments {
+    fn form(&self) -> Form {
+        match (self.json, self.csv) {
+            (true, _) => Form::Json,
+            (_, true) => Form::Csv,
+            _ => Form::Text,
+        }
+    }
+
     /// The short cut for this sweep; none where more is asked for than that everything is up to date.
     fn unchanged(&self, global: &Global) -> Option<Unchanged> {
-        let plain = self.goal.is_none() && !self.report && !self.list && self.trace.is_none() && global.verbose == 0;
+        let plain =
+            self.search.goal.is_none() && !self.report && !self.list && self.trace.is_none() && global.verbose == 0;
         let mut more = vec![
             ("--out", path_bytes(self.out.as_deref())),
             ("--pictures", vec![self.pictures as u8]),
@@ -163,36 +166,9 @@ fn exit(table: &SweepTable) -> Exit {
     }
 }
 
-pub(super) fn write_tables(table: &SweepTable, out: &Path) -> Result<(), Fault> {
-    run::write_file(&out.join("sweep.csv"), to_csv(table)?.as_bytes())?;
-    let ron = table.to_ron().map_err(|error| fault(&error))?;
-    Ok(run::write_file(&out.join("sweep.ron"), ron.as_bytes())?)
-}
-
-fn to_csv(table: &SweepTable) -> Result<String, Fault> {
-    table.to_csv().map_err(|error| fault(&error))
-}
-
-fn fault(error: &dyn std::fmt::Display) -> Fault {
-    Fault::new(Exit::Fault, format!("cannot write the table: {error}"))
-}
-
-/// The table in the form asked for.
-pub(super) fn table_text(table: &SweepTable, arguments: &Arguments, quiet: bool) -> Result<String, Fault> {
-    Ok(if arguments.json {
-        document_text(Kind::Sweep, table)?
-    } else if arguments.csv {
-        to_csv(table)?.trim_end().to_owned()
-    } else if quiet {
-        String::new()
-    } else {
-        table.to_text()
-    })
-}
-
 /// Prints the table and what went wrong, and gives back what was said.
 fn tell(table: &SweepTable, arguments: &Arguments, quiet: bool) -> Result<Said, Fault> {
-    let out = table_text(table, arguments, quiet)?;
+    let out = table_text(table, arguments.form(), quiet)?;
     let mut err = Vec::new();
     for row in &table.rows {
         if let (RowState::Failed | RowState::GateFailed, Some(reason)) = (row.state, &row.reason) {

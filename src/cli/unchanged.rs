@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use super::Global;
 use super::context::RecipeArguments;
 use super::exit::{Fault, data, say};
-use super::run::record_text;
+use super::record::record_text;
 use crate::report::Report;
 use crate::store::Store;
 use crate::store::stamp::{Said, Seen, identity, program};

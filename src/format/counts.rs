@@ -1,12 +1,16 @@
 //! What a reader did besides reading, and what it left out.
 
+use schemars::JsonSchema;
+use serde::Serialize;
+
 use crate::terminal::printable;
 
 /// Notes by name; the rest is counted, since a deck may have as many as it has lines.
 const MOST_NOTES: usize = 40;
 
 /// What a reader did besides reading.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
 pub struct ReadCounts {
     /// Polygons with more than four corners, cut into triangles.
     pub polygons_triangulated: usize,
@@ -20,7 +24,9 @@ pub struct ReadCounts {
     pub nodes_dropped: usize,
     /// Volumes and other elements that are no faces, left out.
     pub elements_dropped: usize,
+    #[serde(skip)]
     notes: Vec<String>,
+    #[serde(skip)]
     more_notes: usize,
 }
 

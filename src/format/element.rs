@@ -23,7 +23,7 @@ use glam::DVec3;
 use rustc_hash::FxHashMap;
 
 use super::error::{FormatError, Place, Reason};
-use super::polygon::triangulate;
+use super::polygon::{quad, triangulate};
 use super::skin::{Own, Volumes, volume_corners};
 use super::{Element, ReadCounts, WriteOptions};
 use crate::mesh::{EdgeKey, Facet, Field, Soup, Support, VertexId, edge_key};
@@ -216,19 +216,6 @@ impl Elements {
         }
         Ok(self.counts)
     }
-}
-
-/// A quad, or the triangle that is left when two neighbouring corners are one node.
-pub(super) fn quad(c: [VertexId; 4]) -> Facet {
-    for i in 0..4 {
-        if c[i] == c[(i + 1) % 4] {
-            let rest = [c[(i + 1) % 4], c[(i + 2) % 4], c[(i + 3) % 4]];
-            if rest[0] != rest[1] && rest[1] != rest[2] && rest[2] != rest[0] {
-                return Facet::Tri(rest);
-            }
-        }
-    }
-    Facet::Quad(c)
 }
 
 /// Drops the vertices that are not kept, and renumbers everything that names vertices. No face names a dropped one.

@@ -11,7 +11,20 @@
 use glam::{DVec2, DVec3};
 use robust::{Coord, orient2d};
 
-use crate::mesh::VertexId;
+use crate::mesh::{Facet, VertexId};
+
+/// A quad, or the triangle that is left when two neighbouring corners are one node.
+pub(super) fn quad(c: [VertexId; 4]) -> Facet {
+    for i in 0..4 {
+        if c[i] == c[(i + 1) % 4] {
+            let rest = [c[(i + 1) % 4], c[(i + 2) % 4], c[(i + 3) % 4]];
+            if rest[0] != rest[1] && rest[1] != rest[2] && rest[2] != rest[0] {
+                return Facet::Tri(rest);
+            }
+        }
+    }
+    Facet::Quad(c)
+}
 
 /// The triangles of `polygon`, oriented like it. Fewer than three corners give none.
 pub(super) fn triangulate(points: &[DVec3], polygon: &[VertexId]) -> Vec<[VertexId; 3]> {

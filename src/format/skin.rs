@@ -12,7 +12,7 @@ use std::ops::Range;
 use glam::DVec3;
 use rustc_hash::FxHashMap;
 
-use super::element::quad;
+use super::polygon::quad;
 use crate::mesh::{Facet, VertexId};
 
 const TETRAHEDRON: &[&[usize]] = &[&[0, 2, 1], &[0, 1, 3], &[1, 2, 3], &[0, 3, 2]];

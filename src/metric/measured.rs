@@ -19,9 +19,20 @@ use super::intersection::Intersections;
 use super::quad_layout::Layout;
 use super::quad_shape::QuadShapes;
 use super::shape::TriangleShapes;
-use super::subject::Extent;
 use super::topology::Topology;
 use crate::mesh::Soup;
+use crate::mesh::geometry::Aabb;
+
+/// Bounding box, area and volume.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Extent {
+    /// The box of all vertices that a face uses.
+    pub bounds: Aabb,
+    /// Sum of face areas.
+    pub area: f64,
+    /// Signed volume.
+    pub volume: f64,
+}
 
 /// What belongs to one mesh.
 #[derive(Debug, Default)]

@@ -8,7 +8,7 @@ use glam::DVec3;
 use super::distance::{self, Target, TwoSided};
 use super::feature::{FeatureDeviation, feature_deviation};
 use super::intersection::{Intersections, self_intersections};
-use super::measured::{Alone, Measured, Pair, kept};
+use super::measured::{Alone, Extent, Measured, Pair, kept};
 use super::quad_layout::{Layout, layout_counts};
 use super::quad_shape::{QuadShapes, quad_shapes};
 use super::shape::{TriangleShapes, triangle_shapes};
@@ -17,17 +17,6 @@ use super::topology::{Topology, topology};
 use crate::mesh::geometry::{Aabb, triangle_area};
 use crate::mesh::{FaceId, Facet, Soup};
 use crate::watch::Watch;
-
-/// Bounding box, area and volume.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Extent {
-    /// The box of all vertices that a face uses.
-    pub bounds: Aabb,
-    /// Sum of face areas.
-    pub area: f64,
-    /// Signed volume.
-    pub volume: f64,
-}
 
 /// A mesh under measurement.
 pub struct Subject<'a> {

@@ -165,6 +165,17 @@ impl SweepTable {
     }
 }
 
+impl SweepRow {
+    /// Notes the conditions of a goal that do not hold: the case counts as one whose gate does not.
+    pub fn misses(&mut self, unmet: &[GateRow]) {
+        for judged in unmet {
+            let reason = wanted("goal", judged);
+            self.reason = Some(self.reason.take().map_or(reason.clone(), |other| format!("{other}; {reason}")));
+            self.state = RowState::GateFailed;
+        }
+    }
+}
+
 impl RowState {
     /// What it is called in tables.
     pub fn text(self) -> &'static str {
@@ -273,7 +284,7 @@ fn verdict(case: &Case, gates: &[(&str, GateRow)], plan: &Plan, outcome: &RunOut
 }
 
 /// What a check wanted and what was measured.
-pub fn wanted(step: &str, row: &GateRow) -> String {
+fn wanted(step: &str, row: &GateRow) -> String {
     let measured = row.measured.as_ref().map_or_else(|| "undefined".to_owned(), value_text);
     format!("{step}.{} is {measured}, wanted {}", row.metric, row.limit)
 }

@@ -8,10 +8,9 @@
 use std::sync::Arc;
 
 use glam::DVec3;
-use serde::{Deserialize, Serialize};
 
 use super::gate;
-use super::job::Finished;
+use super::node::{FileNotes, Finished};
 use super::shared::Shared;
 use crate::format::{self, Format};
 use crate::mesh::{FaceId, Soup, VertexId};
@@ -23,15 +22,6 @@ use crate::watch::Watch;
 
 /// Told where a vertex moves by more than this share of the shortest edge.
 const TELLING: f64 = 0.01;
-
-/// What there is to say of a file.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct FileNotes {
-    /// What the mesh has and the file has not.
-    pub lost: Vec<String>,
-    /// What else: how it was written and why, by how much rounding moved it.
-    pub note: Option<String>,
-}
 
 /// Makes the bytes of an output file and certifies them. `write` makes them, binary or not.
 pub(super) fn certified(

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::job::Finished;
+use super::node::Finished;
 use super::shared::Shared;
 use crate::metric::gate::{Check, GateError, GateReport, judge};
 use crate::metric::{Measured, Subject};

@@ -5,57 +5,15 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::time::Instant;
 
-use super::certify::FileNotes;
 use super::figures::figures;
+use super::node::{Finished, Node};
 use super::observe::{Event, Observer};
-use super::shared::{NoArtifact, Shared, VERSION, recipe_task};
-use super::{FileState, RunError, gate, output};
+use super::shared::{Shared, VERSION, recipe_task};
+use super::{gate, output};
 use crate::plan::{ContentHash, GateTask, Record, StepTask, Task, TaskId};
 use crate::step::{FailureKind, Inputs, OutPort, Port, StepFailure};
 use crate::store::{Entry, Outcome};
 use crate::watch::{Progress, Watch};
-
-/// What a node of a run does.
-#[derive(Clone, Copy, Debug)]
-pub(super) enum Node {
-    /// A task of the plan.
-    Task(TaskId),
-    /// An output file: case and position in the case.
-    File(usize, usize),
-    /// The elements at fault of a gate: case and position in the case.
-    Faults(usize, usize),
-}
-
-/// How a job ended.
-pub(super) enum Finished {
-    /// The task's result is stored.
-    Task(Box<Entry>),
-    /// The file is right.
-    File(FileState, ContentHash, FileNotes),
-    /// There is nothing to write.
-    Nothing,
-    /// The artifact of this input is gone: make it again, then run this job again.
-    Lost(TaskId),
-    /// It cannot be done.
-    Failed(StepFailure),
-    /// The disk failed; the whole run ends.
-    Broken(RunError),
-}
-
-impl From<NoArtifact> for Finished {
-    fn from(reason: NoArtifact) -> Self {
-        match reason {
-            NoArtifact::Lost(task) => Self::Lost(task),
-            NoArtifact::Failed(failure) => Self::Failed(failure),
-        }
-    }
-}
-
-impl<E: Into<RunError>> From<E> for Finished {
-    fn from(error: E) -> Self {
-        Self::Broken(error.into())
-    }
-}
 
 /// Passes a step's progress on under its node's number.
 struct NodeProgress {

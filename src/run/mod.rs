@@ -25,6 +25,7 @@ mod gate;
 mod guard;
 mod job;
 mod names;
+mod node;
 pub mod observe;
 pub mod outcome;
 mod output;
@@ -33,6 +34,8 @@ pub mod preview;
 mod schedule;
 mod shared;
 pub mod source;
+mod state;
+pub mod study;
 mod whole;
 
 use std::collections::BTreeSet;
@@ -40,15 +43,15 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-pub use board::TaskState;
-pub use certify::FileNotes;
 pub use claim::{Claim, claim};
 pub use guard::{is_inside, replaced};
+pub use node::FileNotes;
 pub use observe::{Event, Observer, Silent};
 pub use outcome::{FileOutcome, FileState, RunOutcome, TaskOutcome};
 pub use preview::{Explained, Forecast, explain, preview, records};
 pub use schedule::run;
 pub use shared::{VERSION, recipe_task};
+pub use state::TaskState;
 
 // An outcome speaks of these, so whoever reads outcomes finds them here.
 pub use crate::plan::{Case, Change, Column, Gate, Output, Plan, Record, StepTask, Task, TaskId, in_case};

@@ -1,6 +1,6 @@
 //! What happens during a run, for whoever wants to show it. Observers never affect a result.
 
-use super::board::TaskState;
+use super::state::TaskState;
 use crate::store::Entry;
 use crate::watch::Progress;
 

@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
-use super::board::TaskState;
-use super::certify::FileNotes;
+use super::node::FileNotes;
+use super::state::TaskState;
 use crate::metric::gate::GateReport;
 use crate::plan::{ContentHash, Key, Plan, TaskId};
 use crate::step::{FailureKind, StepFailure};

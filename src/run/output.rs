@@ -12,8 +12,8 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::certify::{FileNotes, certified};
-use super::job::{Finished, Node};
+use super::certify::certified;
+use super::node::{FileNotes, Finished, Node};
 use super::shared::{Shared, VERSION, recipe_task};
 use super::{FileState, RunError, whole};
 use crate::format::{self, Element, Format, WriteOptions};

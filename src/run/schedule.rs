@@ -7,12 +7,13 @@ use std::sync::{Arc, mpsc};
 use std::thread;
 use std::time::Instant;
 
-use super::board::{Board, TaskState};
-use super::certify::FileNotes;
-use super::job::{self, Finished, Node};
+use super::board::Board;
+use super::job;
+use super::node::{FileNotes, Finished, Node};
 use super::observe::Observer;
 use super::outcome::{FileOutcome, FileState, RunOutcome, TaskOutcome};
 use super::shared::Shared;
+use super::state::TaskState;
 use super::{RunError, RunOptions, guard, output, tasks_of};
 use crate::plan::{Plan, SourceTask, Task, TaskId, in_case};
 use crate::step::{FailureKind, StepFailure};

@@ -66,18 +66,9 @@ pub struct ReadStats {
     pub groups: usize,
     /// Fields on vertices and faces.
     pub fields: usize,
-    /// Polygons with more than four corners that were cut into triangles.
-    pub polygons_triangulated: usize,
-    /// Faces with fewer than three corners that were left out.
-    pub faces_dropped: usize,
-    /// Fields with a number that is NaN or infinite, left out.
-    pub fields_dropped: usize,
-    /// Repeated corners merged into a vertex with identical coordinates.
-    pub corners_welded: usize,
-    /// Nodes that only mid-side positions or left-out elements used, left out.
-    pub nodes_dropped: usize,
-    /// Volumes and other elements that are no faces, left out.
-    pub elements_dropped: usize,
+    /// What reading did besides.
+    #[serde(flatten)]
+    pub counts: ReadCounts,
     /// All that the file has and the mesh has not, in words.
     pub left_out: Vec<String>,
 }
@@ -117,7 +108,7 @@ pub fn read(file: &FileBytes, params: &ReadParams, watch: &Watch) -> Result<(Sou
     let (format, mut soup, counts) = read_format(file, params, watch)
         .map_err(|error| ReadError::Format { name: file.name.clone(), error: Box::new(error) })?;
     scale_points(&mut soup, params.scale)?;
-    let stats = stats(format, &soup, &counts);
+    let stats = stats(format, &soup, counts);
     Ok((soup, stats))
 }
 
@@ -147,7 +138,7 @@ fn scale_points(soup: &mut Soup, scale: f64) -> Result<(), ReadError> {
     Ok(())
 }
 
-fn stats(format: Format, soup: &Soup, counts: &ReadCounts) -> ReadStats {
+fn stats(format: Format, soup: &Soup, counts: ReadCounts) -> ReadStats {
     let triangles = soup.faces.iter().filter(|f| matches!(f, Facet::Tri(_))).count();
     ReadStats {
         format,
@@ -156,13 +147,8 @@ fn stats(format: Format, soup: &Soup, counts: &ReadCounts) -> ReadStats {
         quads: soup.faces.len() - triangles,
         groups: soup.carried.groups.list().count(),
         fields: soup.carried.fields.len(),
-        polygons_triangulated: counts.polygons_triangulated,
-        faces_dropped: counts.faces_dropped,
-        fields_dropped: counts.fields_dropped,
-        corners_welded: counts.corners_welded,
-        nodes_dropped: counts.nodes_dropped,
-        elements_dropped: counts.elements_dropped,
         left_out: counts.left_out(),
+        counts,
     }
 }
 

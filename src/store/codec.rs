@@ -10,6 +10,7 @@ use std::sync::Arc;
 use blake3::Hash;
 use glam::DVec3;
 
+pub use super::columns::{CODEC_VERSION, CodecError};
 use super::columns::{ColumnReader, ColumnWriter, HEAD};
 use crate::mesh::{
     Carried, EdgeKey, EdgeMark, Facet, Field, Freedom, Groups, Id, IdVec, MarkCause, Quads, Regions, SeamId, Soup,
@@ -23,24 +24,7 @@ mod curves;
 mod forest;
 mod patches;
 
-/// Raised whenever the canonical bytes of equal artifacts change; part of every key.
-pub const CODEC_VERSION: u16 = 2;
-
 const MAGIC: [u8; 4] = *b"mmca";
-
-/// Why bytes are not an artifact.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum CodecError {
-    /// The bytes end too early.
-    #[error("the data end too early")]
-    Truncated,
-    /// The bytes contradict themselves.
-    #[error("the data are malformed: {0}")]
-    Malformed(&'static str),
-    /// Written by another version of the codec.
-    #[error("the data have codec version {0}, this program reads {CODEC_VERSION}")]
-    Version(u16),
-}
 
 /// The content hash of an artifact's canonical bytes; for a file, of its bytes.
 pub fn content_hash(canonical: &[u8]) -> Hash {

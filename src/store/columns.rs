@@ -3,7 +3,22 @@
 //! A stream is an 8-byte head (magic, codec version, artifact tag) and columns; a column is one kind byte, its number
 //! of elements as `u64`, and the elements, all little endian. Reading never allocates more than the stream holds.
 
-use super::codec::CodecError;
+/// Raised whenever the canonical bytes of equal artifacts change; part of every key.
+pub const CODEC_VERSION: u16 = 2;
+
+/// Why bytes are not an artifact.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum CodecError {
+    /// The bytes end too early.
+    #[error("the data end too early")]
+    Truncated,
+    /// The bytes contradict themselves.
+    #[error("the data are malformed: {0}")]
+    Malformed(&'static str),
+    /// Written by another version of the codec.
+    #[error("the data have codec version {0}, this program reads {CODEC_VERSION}")]
+    Version(u16),
+}
 
 /// What a column's elements are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

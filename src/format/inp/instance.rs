@@ -7,94 +7,18 @@
 
 use std::ops::Range;
 
-use glam::DVec3;
-use libm::{cos, sin};
-
 use super::super::ReadCounts;
 use super::super::element::{Elements, Placed};
 use super::super::error::{FormatError, Place, Reason};
 use super::super::include::locate;
-use super::super::text::parse_number;
-use super::read::{Reader, items};
+use super::read::Reader;
+use super::scope::{Instance, Shift};
 use super::sets::{Card, Sets};
 use crate::mesh::Soup;
 
 /// Instances may make so many nodes and elements for each one in the file; a hostile file could name a part without
 /// end.
 const MOST_COPIES: usize = 256;
-
-/// An instance of a part.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Instance {
-    /// The scope of the part.
-    pub(super) part: usize,
-    /// Where it stands.
-    pub(super) placement: Placement,
-}
-
-/// A translation, and a turn after it.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Placement {
-    shift: DVec3,
-    /// A point of the axis, its direction, and the angle in degrees.
-    turn: Option<(DVec3, DVec3, f64)>,
-}
-
-impl Placement {
-    /// Takes the data line after `before` others.
-    pub(super) fn line(&mut self, before: usize, line: &[u8], place: Place) -> Result<(), FormatError> {
-        let mut numbers = [0.0; 7];
-        let wanted = match before {
-            0 => 3,
-            1 => 7,
-            _ => return Err(FormatError::unexpected(place, "at most two lines of an instance", line)),
-        };
-        for (position, item) in items(line).enumerate().filter(|(_, item)| !item.is_empty()) {
-            if position >= wanted {
-                return Err(FormatError::unexpected(place, "the end of the line", item).with_remedy(
-                    "the first line of an instance moves it by three numbers, the second turns it by seven",
-                ));
-            }
-            numbers[position] = parse_number(item, "a number that moves or turns an instance", place)?;
-        }
-        let [a, b, c, d, e, f, angle] = numbers;
-        if before == 0 {
-            self.shift = DVec3::new(a, b, c);
-            return Ok(());
-        }
-        let (from, to) = (DVec3::new(a, b, c), DVec3::new(d, e, f));
-        self.turn = match (to - from).try_normalize() {
-            Some(axis) => Some((from, axis, angle)),
-            None if angle == 0.0 => None,
-            None => return Err(FormatError::unexpected(place, "an axis between two points that differ", line)),
-        };
-        Ok(())
-    }
-
-    fn place(&self, point: DVec3) -> DVec3 {
-        let moved = point + self.shift;
-        let Some((from, axis, angle)) = self.turn else { return moved };
-        // Quarter turns are exact.
-        let (sin, cos) = match angle.rem_euclid(360.0) {
-            0.0 => (0.0, 1.0),
-            90.0 => (1.0, 0.0),
-            180.0 => (0.0, -1.0),
-            270.0 => (-1.0, 0.0),
-            other => (sin(other.to_radians()), cos(other.to_radians())),
-        };
-        let arm = moved - from;
-        from + arm * cos + axis.cross(arm) * sin + axis * (axis.dot(arm) * (1.0 - cos))
-    }
-}
-
-/// Where the nodes and elements of a scope are now, relative to those of its part.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Shift {
-    /// Added to positions of nodes.
-    pub(super) nodes: u32,
-    /// Added to positions of elements.
-    pub(super) elements: u32,
-}
 
 impl Reader<'_> {
     /// The mesh of all cards.

@@ -27,6 +27,7 @@ mod elements;
 mod harmless;
 mod instance;
 mod read;
+mod scope;
 mod sets;
 mod write;
 

@@ -1,11 +1,9 @@
 //! Reads input files: first the cards with their numbers, then what the numbers mean.
 
 use std::collections::BTreeMap;
-use std::ops::Range;
 use std::sync::Arc;
 
 use glam::DVec3;
-use rustc_hash::FxHashMap;
 
 use super::super::ReadCounts;
 use super::super::element::Shape;
@@ -13,7 +11,7 @@ use super::super::error::{FormatError, Place, Reason};
 use super::super::text::{parse_integer, parse_number};
 use super::elements::element_type;
 use super::harmless::{MAKES_GEOMETRY, is_harmless};
-use super::instance::{Instance, Placement};
+use super::scope::{Instance, Placement, Scope, items};
 use super::sets::{Card, Kind};
 use crate::mesh::Soup;
 use crate::watch::Watch;
@@ -23,24 +21,6 @@ const STRIDE: u64 = 1 << 16;
 
 /// Names of unknown cards that are kept.
 const MOST_UNKNOWN: usize = 1000;
-
-/// Numbers of one part, or of the assembly, which is the first scope; or an instance of a part, with the part's
-/// numbers.
-#[derive(Debug, Default)]
-pub(super) struct Scope {
-    /// The name of the part or instance, empty outside both.
-    pub(super) name: String,
-    /// Positions of nodes by number.
-    pub(super) nodes: FxHashMap<i64, u32>,
-    /// Positions of elements by number.
-    pub(super) elements: FxHashMap<i64, u32>,
-    /// Where its nodes lie among all.
-    pub(super) node_range: Range<usize>,
-    /// Where its elements lie among all.
-    pub(super) element_range: Range<usize>,
-    /// The part that this is an instance of, and where it stands.
-    pub(super) instance: Option<Instance>,
-}
 
 /// An element as its card gives it.
 #[derive(Debug)]
@@ -125,11 +105,6 @@ pub(super) fn read(bytes: &[u8], watch: &Watch) -> Result<(Soup, ReadCounts), Fo
     }
     reader.end_block(Place::File)?;
     reader.finish()
-}
-
-/// The comma-separated items of a data line; a comma at the end is no item.
-pub(super) fn items(line: &[u8]) -> impl Iterator<Item = &[u8]> {
-    line.strip_suffix(b",").unwrap_or(line).split(|&b| b == b',').map(<[u8]>::trim_ascii)
 }
 
 impl Reader<'_> {

@@ -10,8 +10,7 @@ use super::super::ReadCounts;
 use super::super::element::Placed;
 use super::super::error::{FormatError, Place, Reason};
 use super::super::text::parse_integer;
-use super::instance::Shift;
-use super::read::Scope;
+use super::scope::{Scope, Shift};
 use crate::mesh::{EdgeKey, FaceId, Facet, Groups, VertexId, edge_key};
 
 /// What a card's members are.

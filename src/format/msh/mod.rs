@@ -24,6 +24,7 @@
 /// The physical group of faces that are in none.
 const NO_GROUP: &str = "(no group)";
 
+mod model;
 mod read;
 mod v2;
 mod v4;

@@ -8,7 +8,7 @@ use super::super::element::Placed;
 use super::super::error::{FormatError, Place, Reason};
 use super::super::mixed::Input;
 use super::element_type;
-use super::read::Model;
+use super::model::Model;
 
 /// `$Nodes` or `$ParametricNodes`.
 pub(super) fn nodes(input: &mut Input<'_>, model: &mut Model<'_>, parametric: bool) -> Result<(), FormatError> {

@@ -8,7 +8,7 @@ use smallvec::SmallVec;
 use super::super::error::FormatError;
 use super::super::mixed::Input;
 use super::element_type;
-use super::read::Model;
+use super::model::Model;
 use super::v2::{point, unknown};
 
 /// `$Entities`: only the physical groups of each entity matter.

@@ -1,6 +1,7 @@
 //! What a search looks for: `min faces where min-stretch >= 0.3 and distance <= 0.2%`.
 
 pub mod search;
+pub mod vary;
 
 use super::columns::ColumnRequest;
 use crate::metric::gate::Limit;

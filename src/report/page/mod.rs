@@ -14,6 +14,7 @@
 
 mod chart;
 mod column;
+mod front;
 mod graph;
 mod line;
 mod meshes;
@@ -94,7 +95,7 @@ pub fn html(
     library: &dyn Library,
     options: &PageOptions,
 ) -> Result<String, PageError> {
-    let best = table.and_then(|table| sweep::front(table).first().map(|row| row.case.as_str()));
+    let best = table.and_then(|table| front::front(table).first().map(|row| row.case.as_str()));
     let best = report.cases.iter().find(|case| Some(case.name.as_str()) == best);
     let case = best.or(report.cases.first()).ok_or(PageError::Empty)?;
     let mut chosen = outline::Outline::new(case, &options.steps)?;

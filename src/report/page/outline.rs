@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::PageError;
-use super::sweep::{front, mesh_name};
+use super::front::{front, mesh_name};
 use crate::report::sweep::{SweepRow, SweepTable};
 use crate::report::{CaseReport, StepReport};
 

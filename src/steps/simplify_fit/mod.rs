@@ -49,7 +49,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::mesh::halfedge::EnterError;
 use crate::mesh::transfer::inherit_fields;
-use crate::mesh::{FreedomError, LockRules, Surface, VertexId, resolve_freedom};
+use crate::mesh::{FreedomError, LockRules, Surface, resolve_freedom};
 use crate::metric::ToleranceMode;
 use crate::step::{
     Angle, Artifact, InputDef, Inputs, Length, Locks, OutOfRange, OutPort, OutputDef, Port, Produced, REFERENCE, Share,
@@ -284,33 +284,36 @@ fn simplified(
     let is_short = guarded.mesh().face_count() > plan.target;
     let barred = is_short.then(|| report::bars(&mut guarded, plan.setup.limits.min_stretch));
     let distance_bound = guarded.distance_bound(plan.tolerance);
-    let slots: Vec<VertexId> = guarded.mesh().vertices().collect();
-    let on_fits: Vec<_> = slots.iter().map(|&v| report::on_fit(&fits, guarded.mesh().point(v), v)).collect();
+    let on_fit = |v| report::on_fit(&fits, guarded.mesh().point(v), v);
+    let on_fits: Vec<_> = guarded.mesh().vertices().map(on_fit).collect();
     let mut result = guarded.into_mesh().leave().surface;
     let freedom = resolve_freedom(&result, &input.locks)?;
     let least = least_stretch_of(params.max_aspect);
-    let mut stats = report::quality(&result, &freedom, params.max_aspect, least);
+    let quality = report::quality(&result, &freedom, params.max_aspect, least);
     tangent::without_smooth_lines(&mut result);
     inherit_fields(input.surface, &mut result);
     report::set_fields(&mut result, &on_fits);
-    stats.faces_before = input.surface.faces.len();
-    stats.target_faces = plan.target;
-    stats.removed = 1.0 - result.faces.len() as f64 / input.surface.faces.len().max(1) as f64;
-    let holds = result.faces.len() <= plan.target && stats.faces_above_aspect == stats.excused_faces;
-    stats.status = if holds { Status::TargetReached } else { Status::Stuck };
-    stats.operations = report::operations(&done, counts);
-    stats.spheres = Trials { tried: fits.tried[0], accepted: fits.accepted[0] };
-    stats.cylinders = Trials { tried: fits.tried[1], accepted: fits.accepted[1] };
-    stats.fillets = done.fillets;
-    stats.vertices_on_fits = on_fits.iter().flatten().count();
-    stats.radii = report::histogram(on_fits.into_iter().flatten());
-    stats.largest_projection = done.largest_projection;
-    stats.refused_by_tolerance = counts.refused_by_tolerance;
-    stats.refused_by_intersection = counts.refused_by_intersection;
-    stats.barred = barred;
-    stats.smooth_edges = smooth_edges;
-    stats.tolerance = plan.tolerance;
-    stats.distance_bound = distance_bound;
+    let holds = result.faces.len() <= plan.target && quality.faces_above_aspect == quality.excused_faces;
+    let stats = SimplifyFitStats {
+        status: if holds { Status::TargetReached } else { Status::Stuck },
+        faces_before: input.surface.faces.len(),
+        target_faces: plan.target,
+        removed: 1.0 - result.faces.len() as f64 / input.surface.faces.len().max(1) as f64,
+        operations: report::operations(&done, counts),
+        spheres: Trials { tried: fits.tried[0], accepted: fits.accepted[0] },
+        cylinders: Trials { tried: fits.tried[1], accepted: fits.accepted[1] },
+        fillets: done.fillets,
+        vertices_on_fits: on_fits.iter().flatten().count(),
+        radii: report::histogram(on_fits.into_iter().flatten()),
+        largest_projection: done.largest_projection,
+        refused_by_tolerance: counts.refused_by_tolerance,
+        refused_by_intersection: counts.refused_by_intersection,
+        barred,
+        smooth_edges,
+        tolerance: plan.tolerance,
+        distance_bound,
+        ..quality
+    };
     Ok((result, stats))
 }
 

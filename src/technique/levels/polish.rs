@@ -7,7 +7,6 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::report::Shape;
 use crate::mesh::bvh::TriangleBvh;
 use crate::mesh::{LockRules, Surface, resolve_freedom};
 use crate::metric::ToleranceMode;
@@ -20,6 +19,15 @@ const ROUNDS: usize = 8;
 
 /// The room for rounding in thresholds that the front itself sets.
 const SLACK: f64 = 1e-6;
+
+/// What thresholds are asked of.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Shape {
+    pub(super) min_stretch: f64,
+    pub(super) mean_stretch: f64,
+    pub(super) max_size: f64,
+    pub(super) max_valence: usize,
+}
 
 /// What polishing did.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::polish::{PolishReport, polish};
+use super::polish::{PolishReport, Shape, polish};
 use crate::mesh::geometry::triangle_normal;
 use crate::mesh::hierarchy::NodeId;
 use crate::mesh::topology::EdgeTable;
@@ -78,15 +78,6 @@ impl HierarchyReport {
             finest_max_valence: counted.max_valence,
         }
     }
-}
-
-/// What thresholds are asked of.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Shape {
-    pub(super) min_stretch: f64,
-    pub(super) mean_stretch: f64,
-    pub(super) max_size: f64,
-    pub(super) max_valence: usize,
 }
 
 fn shape(mesh: &Surface) -> Shape {

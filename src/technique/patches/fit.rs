@@ -4,8 +4,7 @@ use glam::DVec3;
 
 use super::flatten::flatten;
 use super::frame::Frame;
-use super::solve::{Curve, Samples, fit_inside, fit_tangent};
-use super::tangent::Tangency;
+use super::solve::{Curve, Samples, Tangency, fit_inside, fit_tangent};
 use super::{FitRules, normal, on_side};
 use crate::mesh::geometry::{self, Aabb};
 use crate::mesh::patches::Patch;

@@ -3,8 +3,18 @@
 use glam::DVec3;
 use nalgebra::{DMatrix, DVector};
 
-use super::tangent::Tangency;
 use crate::mesh::patches::{Patch, basis};
+
+/// A place on a side where the derivative across it shall lie in a plane.
+#[derive(Clone, Copy, Debug)]
+pub struct Tangency {
+    /// Where on the patch.
+    pub place: [f64; 2],
+    /// Whether the derivative along u is meant; else along v.
+    pub is_along_u: bool,
+    /// The normal of the plane, divided by the length of the derivative as it is.
+    pub normal: DVec3,
+}
 
 /// A cubic B-spline curve.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -132,14 +132,3 @@ fn plane(frame: &Frame<'_>, curves: &[Curve], node: VertexId, sector: &[Corner],
         _ => Some(mean),
     }
 }
-
-/// A place on a side where the derivative across it shall lie in a plane.
-#[derive(Clone, Copy, Debug)]
-pub struct Tangency {
-    /// Where on the patch.
-    pub place: [f64; 2],
-    /// Whether the derivative along u is meant; else along v.
-    pub is_along_u: bool,
-    /// The normal of the plane, divided by the length of the derivative as it is.
-    pub normal: DVec3,
-}

@@ -11,11 +11,10 @@ use std::collections::BTreeMap;
 use glam::DVec3;
 
 use super::relax;
-use super::search::mend_by_search;
-use crate::mesh::geometry::{angle, area_vector, stretch};
-use crate::mesh::halfedge::{HalfedgeMesh, edge_of};
+use super::search::{mend_by_search, reachable};
+use crate::mesh::geometry::{area_vector, stretch};
+use crate::mesh::halfedge::edge_of;
 use crate::mesh::{EdgeId, FaceId, Freedom, VertexId};
-use crate::metric::shape::best_stretch_with_angle;
 use crate::technique::collapse::{CollapseRules, collapse_edge};
 use crate::technique::guarded::{Gain, GuardedMesh, StarRules, Tally};
 use crate::watch::{Cancelled, Watch};
@@ -28,12 +27,6 @@ const MOST_SEARCHES: usize = 4;
 
 /// Faces searched in one round, worst first: each costs as much as thousands of edits.
 const MOST_SEARCHED: usize = 400;
-
-/// A face this near to the best that its corner between two curves allows is left alone.
-const NEAR_BEST: f64 = 0.95;
-
-/// Radians below which the angle between two curves may be what limits a face.
-const SHARP: f64 = 0.5;
 
 /// Raises the stretch of the faces below `threshold`, worst first, and where no single edit helps by a search for
 /// several. Returns how many are left.
@@ -121,26 +114,6 @@ fn age(guarded: &GuardedMesh<'_>, f: FaceId) -> u64 {
     let mesh = guarded.mesh();
     let around = mesh.corners(f).into_iter().flat_map(|v| mesh.neighbours(v));
     around.map(|v| u64::from(mesh.version(v))).sum()
-}
-
-/// The stretch a face should reach: `threshold`, or where curves meet in one of its corners too sharply for that,
-/// nearly the best that the corner allows.
-pub(super) fn reachable(mesh: &HalfedgeMesh, f: FaceId, threshold: f64) -> f64 {
-    let first = mesh.face_halfedge(f);
-    let sides = [first, mesh.next(first), mesh.prev(first)];
-    let is_curve = sides.map(|h| mesh.edge_freedom(edge_of(h)) != Freedom::Free);
-    let corners = sides.map(|h| mesh.point(mesh.origin(h)));
-    let mut target = threshold;
-    for at in 0..3 {
-        let (next, before) = ((at + 1) % 3, (at + 2) % 3);
-        if is_curve[at] && is_curve[before] {
-            let opening = angle(corners[next] - corners[at], corners[before] - corners[at]);
-            if opening < SHARP {
-                target = target.min(NEAR_BEST * best_stretch_with_angle(opening));
-            }
-        }
-    }
-    target
 }
 
 /// The live faces with less stretch, worst first.

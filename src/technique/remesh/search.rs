@@ -7,12 +7,18 @@
 
 use glam::DVec3;
 
-use super::raise::reachable;
 use crate::mesh::edit::{Placement, check_collapse};
-use crate::mesh::geometry::stretch;
+use crate::mesh::geometry::{angle, stretch};
 use crate::mesh::halfedge::{HalfedgeMesh, edge_of, halfedge_of, twin};
 use crate::mesh::{EdgeId, FaceId, Freedom, HalfedgeId, VertexId};
+use crate::metric::shape::best_stretch_with_angle;
 use crate::technique::guarded::{Draft, Edit, Gain, GuardedMesh, Trial};
+
+/// A face this near to the best that its corner between two curves allows is left alone.
+const NEAR_BEST: f64 = 0.95;
+
+/// Radians below which the angle between two curves may be what limits a face.
+const SHARP: f64 = 0.5;
 
 /// Edits in a sequence.
 const DEPTH: usize = 5;
@@ -207,4 +213,24 @@ fn moves(guarded: &GuardedMesh<'_>, mesh: &HalfedgeMesh, v: VertexId, out: &mut 
             }
         }
     }
+}
+
+/// The stretch a face should reach: `threshold`, or where curves meet in one of its corners too sharply for that,
+/// nearly the best that the corner allows.
+pub(super) fn reachable(mesh: &HalfedgeMesh, f: FaceId, threshold: f64) -> f64 {
+    let first = mesh.face_halfedge(f);
+    let sides = [first, mesh.next(first), mesh.prev(first)];
+    let is_curve = sides.map(|h| mesh.edge_freedom(edge_of(h)) != Freedom::Free);
+    let corners = sides.map(|h| mesh.point(mesh.origin(h)));
+    let mut target = threshold;
+    for at in 0..3 {
+        let (next, before) = ((at + 1) % 3, (at + 2) % 3);
+        if is_curve[at] && is_curve[before] {
+            let opening = angle(corners[next] - corners[at], corners[before] - corners[at]);
+            if opening < SHARP {
+                target = target.min(NEAR_BEST * best_stretch_with_angle(opening));
+            }
+        }
+    }
+    target
 }

@@ -9,12 +9,26 @@
 use glam::DVec3;
 
 use super::clip::{self, Convex};
-use super::envelope::{Change, Triangle};
-use super::target::{Target, find_owner, is_near_any, nearest};
+use super::target::{Target, Triangle, find_owner, is_near_any, nearest};
 use crate::mesh::bvh::TriangleBvh;
 use crate::mesh::geometry::closest_on_triangle;
 use crate::mesh::halfedge::HalfedgeMesh;
 use crate::mesh::{FaceId, Surface};
+
+/// An edit as the zone sees it.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::technique::guarded) struct Change<'e> {
+    /// The faces replaced.
+    pub(in crate::technique::guarded) old: &'e [FaceId],
+    /// Their corners.
+    pub(in crate::technique::guarded) was: &'e [Triangle],
+    /// Their successors.
+    pub(in crate::technique::guarded) new: &'e [Triangle],
+    /// Faces next to them that stay.
+    pub(in crate::technique::guarded) beside: &'e [Triangle],
+    /// Whether the surface stays as it is, as a set of points.
+    pub(in crate::technique::guarded) is_same: bool,
+}
 
 const NONE: u32 = u32::MAX;
 

@@ -10,7 +10,7 @@
 
 use glam::DVec3;
 
-use super::envelope::Triangle;
+use super::target::Triangle;
 use crate::mesh::geometry::area_vector;
 
 /// More faces than this are left to the full test.

@@ -20,9 +20,9 @@
 use glam::DVec3;
 
 use super::clip::{self, Convex};
-use super::cover::{Cover, Reach};
+use super::cover::{Change, Cover, Reach};
 use super::drift::Drift;
-use super::target::Target;
+use super::target::{Target, Triangle};
 use crate::mesh::bvh::TriangleBvh;
 use crate::mesh::geometry::closest_on_triangle;
 use crate::mesh::halfedge::HalfedgeMesh;
@@ -40,29 +40,12 @@ const CHECK_BUDGET: usize = 3000;
 /// And that the last check of a face may look at, which is made once.
 const CERTIFY_BUDGET: usize = 1_000_000;
 
-pub(super) type Triangle = [DVec3; 3];
-
 /// A bound up to this part of the tolerance decides. Between it and the tolerance the full test does, which may refuse
 /// what comes that near, as parts do not get finer than [`FINEST`]: so a face's past does not decide what is admitted.
 const SURE: f64 = 1.0 - 2.0 * FINEST;
 
 /// How far faces that count as the same set of points may be apart, as a part of the tolerance.
 const SAME: f64 = 2e-6;
-
-/// An edit as the zone sees it.
-#[derive(Clone, Copy, Debug)]
-pub(in crate::technique::guarded) struct Change<'e> {
-    /// The faces replaced.
-    pub(in crate::technique::guarded) old: &'e [FaceId],
-    /// Their corners.
-    pub(in crate::technique::guarded) was: &'e [Triangle],
-    /// Their successors.
-    pub(in crate::technique::guarded) new: &'e [Triangle],
-    /// Faces next to them that stay.
-    pub(in crate::technique::guarded) beside: &'e [Triangle],
-    /// Whether the surface stays as it is, as a set of points.
-    pub(in crate::technique::guarded) is_same: bool,
-}
 
 /// The tolerance zone of a reference, and who covers which piece of it.
 #[derive(Debug)]

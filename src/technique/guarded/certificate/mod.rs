@@ -6,5 +6,6 @@ mod drift;
 mod envelope;
 mod target;
 
+pub(super) use cover::Change;
 pub(super) use drift::Drift;
-pub(super) use envelope::{Change, Envelope};
+pub(super) use envelope::Envelope;

@@ -2,8 +2,9 @@
 
 use glam::DVec3;
 
-use super::envelope::Triangle;
 use crate::mesh::geometry::closest_on_triangle;
+
+pub(super) type Triangle = [DVec3; 3];
 
 /// A triangle that many points are held against, with what does not depend on the point.
 #[derive(Clone, Copy, Debug)]
