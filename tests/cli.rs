@@ -345,7 +345,7 @@ fn what_a_reader_left_out_is_told_by_every_command_alike() {
     let desk = Desk::new();
     let deck = "*NODE\n1, 0, 0, 0\n2, 1, 0, 0\n3, 0, 1, 0\n4, 0, 0, 1\n*ELEMENT, TYPE=S3\n1, 1, 3, 2\n2, 1, 2, 4\n\
         3, 2, 3, 4\n4, 1, 4, 3\n*SURFACE, NAME=s, COMBINE=UNION\nr\n";
-    desk.write("part.inp", &deck);
+    desk.write("part.inp", deck);
     let told = || predicate::str::contains("left out on reading: surface `s` (line 11): COMBINE=UNION").count(1);
     desk.meshmill(&["measure", "part.inp"]).assert().success().stderr(told());
     desk.meshmill(&["convert", "part.inp", "part.off"]).assert().success().stderr(told());

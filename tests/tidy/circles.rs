@@ -107,7 +107,9 @@ fn files_form_no_circle() {
         let before = uses.len();
         uses.retain(|file, others| used.contains(file) && !others.is_empty());
         let left: BTreeSet<Vec<String>> = uses.keys().cloned().collect();
-        uses.values_mut().for_each(|others| others.retain(|other| left.contains(other)));
+        for others in uses.values_mut() {
+            others.retain(|other| left.contains(other));
+        }
         if uses.len() == before {
             break;
         }
