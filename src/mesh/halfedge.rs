@@ -38,8 +38,12 @@ const FREEDOMS: [Freedom; 3] = [Freedom::Free, Freedom::OnCurve, Freedom::Keep];
 const CAUSES: [MarkCause; 5] =
     [MarkCause::Seam, MarkCause::Boundary, MarkCause::Feature, MarkCause::RegionBorder, MarkCause::Locked];
 
+/// Of an [`EdgeState`]: the edge is kept only because it lies on a seam.
+const SEAM_ONLY: u8 = 1 << 7;
+
 impl EdgeState {
     /// Bits 0 and 1: resolved freedom. Bits 2 and 3: freedom of the mark. Bits 4 to 6: its cause plus one, 0 without.
+    /// Bit 7: [`SEAM_ONLY`].
     pub(super) fn new(freedom: Freedom, mark: Option<EdgeMark>) -> Self {
         let mark = mark.map_or(0, |m| ((m.freedom as u8) << 2) | ((m.cause as u8 + 1) << 4));
         Self(freedom as u8 | mark)
@@ -50,8 +54,17 @@ impl EdgeState {
     }
 
     pub(super) fn mark(self) -> Option<EdgeMark> {
-        let cause = CAUSES.get(usize::from(self.0 >> 4).checked_sub(1)?)?;
+        let cause = CAUSES.get(usize::from((self.0 & !SEAM_ONLY) >> 4).checked_sub(1)?)?;
         Some(EdgeMark { freedom: FREEDOMS[usize::from((self.0 >> 2) & 3).min(2)], cause: *cause })
+    }
+
+    /// The same of an edge that nothing but a seam keeps.
+    pub(super) fn on_seam_only(self) -> Self {
+        Self(self.0 | SEAM_ONLY)
+    }
+
+    pub(super) fn is_on_seam_only(self) -> bool {
+        self.0 & SEAM_ONLY != 0
     }
 
     /// The state of an edge that two edges became: the stricter freedom, then the first cause.
@@ -60,7 +73,10 @@ impl EdgeState {
             (Some(a), Some(b)) if (b.freedom, a.cause) > (a.freedom, b.cause) => Some(b),
             (a, b) => a.or(b),
         };
-        Self::new(self.freedom().max(other.freedom()), mark)
+        let merged = Self::new(self.freedom().max(other.freedom()), mark);
+        let keeps = |state: Self| state.freedom() == Freedom::Keep && !state.is_on_seam_only();
+        let is_on_seam = self.is_on_seam_only() || other.is_on_seam_only();
+        if is_on_seam && !keeps(self) && !keeps(other) { merged.on_seam_only() } else { merged }
     }
 }
 
@@ -374,6 +390,11 @@ impl HalfedgeMesh {
     #[inline]
     pub fn edge_freedom(&self, e: EdgeId) -> Freedom {
         self.edge_state[e].freedom()
+    }
+
+    /// Whether an edge is kept only because it lies on a seam: it may be split if all its copies are.
+    pub fn is_on_seam_only(&self, e: EdgeId) -> bool {
+        self.edge_state[e].is_on_seam_only()
     }
 
     /// The carried mark of an edge.

@@ -17,7 +17,7 @@ use super::id::{EdgeId, VertexId};
 pub use collapse::{CollapsePlan, Placement, Ring, check_collapse, collapse};
 pub use flip::{FlipPlan, check_flip, flip};
 pub use relocate::{check_relocate, relocate, slide};
-pub use split::{SplitPlan, check_split, split};
+pub use split::{SplitPlan, check_split, check_split_of_copy, split, split_copies};
 
 /// Why an edit is not done.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]

@@ -1,13 +1,15 @@
 //! Edge split: a new vertex on an edge halves it and its faces.
 //!
 //! The halves inherit mark, freedom and groups of the edge, the new faces the classes of theirs; the new vertex is as
-//! free as the edge and joins the vertex groups that both ends belong to. Refused on kept edges only.
+//! free as the edge and joins the vertex groups that both ends belong to. Refused on kept edges only; those of a seam
+//! are split with all their copies, and the new vertices are on one seam again.
 //! Invariants: Euler characteristic, rims, curves, groups. Cost: O(1), and O(valence) at a rim.
 
 use glam::DVec3;
+use smallvec::SmallVec;
 
 use super::Refusal;
-use crate::mesh::carried::Freedom;
+use crate::mesh::carried::{Freedom, SeamId};
 use crate::mesh::halfedge::{EdgeState, HalfedgeMesh, NONE, halfedge_of, twin};
 use crate::mesh::id::{EdgeId, FaceId, HalfedgeId, VertexId};
 
@@ -33,11 +35,39 @@ pub fn check_split(mesh: &HalfedgeMesh, edge: EdgeId) -> Result<SplitPlan, Refus
     }
 }
 
+/// Whether the edge may be split if all its copies are: as [`check_split`], and what only a seam keeps.
+///
+/// # Errors
+/// [`Refusal::MarkedEdge`] for an edge that something else keeps.
+pub fn check_split_of_copy(mesh: &HalfedgeMesh, edge: EdgeId) -> Result<SplitPlan, Refusal> {
+    if mesh.is_on_seam_only(edge) {
+        return Ok(SplitPlan { edge, ends: mesh.ends(edge), is_curve: true });
+    }
+    check_split(mesh, edge)
+}
+
 /// Splits as planned at `wish`; on a curve at the point of the edge nearest to it. Returns the new vertex.
 pub fn split(mesh: &mut HalfedgeMesh, plan: &SplitPlan, wish: DVec3) -> VertexId {
     debug_assert_eq!(check_split(mesh, plan.edge).as_ref(), Ok(plan), "the plan is out of date");
     let [i, j] = plan.ends;
     let at = if plan.is_curve { super::Placement::Segment(mesh.point(i), mesh.point(j)).nearest(wish) } else { wish };
+    halve(mesh, plan, at)
+}
+
+/// Splits all copies of an edge, each at its point, which lies on it: that is the caller's to see to, and that these
+/// are all copies. Where they are of a seam, the new vertices are on a new seam. Returns those, in order.
+pub fn split_copies(mesh: &mut HalfedgeMesh, copies: &[(SplitPlan, DVec3)]) -> SmallVec<[VertexId; 3]> {
+    let made: SmallVec<[VertexId; 3]> = copies.iter().map(|(plan, at)| halve(mesh, plan, *at)).collect();
+    let is_on_seam = copies.iter().all(|(plan, _)| plan.ends.iter().all(|v| mesh.seams.contains_key(v)));
+    if is_on_seam {
+        let next = mesh.seams.values().map(|seam| seam.0 + 1).max().unwrap_or(0);
+        mesh.seams.extend(made.iter().map(|&v| (v, SeamId(next))));
+    }
+    made
+}
+
+fn halve(mesh: &mut HalfedgeMesh, plan: &SplitPlan, at: DVec3) -> VertexId {
+    let [i, j] = plan.ends;
     let class = mesh.vertex_classes.intersection(mesh.vertex_class[i], mesh.vertex_class[j]);
     let m = mesh.add_vertex(at, mesh.edge_freedom(plan.edge), class);
     let h = halfedge_of(plan.edge);

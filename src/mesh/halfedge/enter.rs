@@ -224,7 +224,9 @@ impl HalfedgeMesh {
             let [a, b] = self.ends(e);
             let key = edge_key(a, b);
             let mark = surface.carried.marks.get(&key).copied();
-            self.edge_state[e] = EdgeState::new(freedom.edge(key), mark);
+            let state = EdgeState::new(freedom.edge(key), mark);
+            let is_on_seam = freedom.edge(key) == Freedom::Keep && freedom.may_halve(key);
+            self.edge_state[e] = if is_on_seam { state.on_seam_only() } else { state };
         }
         let groups = &surface.carried.groups;
         for (label, members) in groups.vertices.values().enumerate() {

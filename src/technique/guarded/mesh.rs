@@ -19,6 +19,7 @@ use super::patch::Patch;
 use super::quadrics::Quadrics;
 use super::refused::Refused;
 use super::star::{Shape, Star};
+use super::ties::Ties;
 use crate::mesh::geometry::{area_vector, stretch, triangle_size};
 use crate::mesh::halfedge::{HalfedgeMesh, edge_of, twin};
 use crate::mesh::{FaceId, Freedom, HalfedgeId, VertexId};
@@ -76,6 +77,7 @@ pub struct GuardedMesh<'a> {
     pub(super) star: Star,
     pub(super) shapes: Vec<Shape>,
     pub(super) recorder: Option<Box<Recorder>>,
+    pub(super) ties: Ties,
     collision: Collision,
     /// Edits done, to tell plans that are out of date.
     pub(super) age: u64,
@@ -95,6 +97,7 @@ impl<'a> GuardedMesh<'a> {
             patch: Patch::default(),
             star: Star::default(),
             recorder: None,
+            ties: Ties::default(),
             age: 0,
         };
         let faces: Vec<FaceId> = this.mesh.faces().collect();

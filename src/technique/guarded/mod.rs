@@ -29,6 +29,8 @@ mod relocate;
 mod split;
 mod star;
 mod tally;
+mod tie;
+mod ties;
 mod transaction;
 
 pub use collapse::{Collapse, Place, Site};

@@ -1,6 +1,7 @@
 //! Split of an edge: a new vertex halves it and its faces.
 
 use glam::DVec3;
+use smallvec::SmallVec;
 
 use super::limits::least_stretch;
 use super::mesh::GuardedMesh;
@@ -17,56 +18,79 @@ const SPLIT_LOSS: f64 = 0.25;
 impl GuardedMesh<'_> {
     /// Splits the edge at `at`, on a curve at its nearest point, where all tests admit it and no face falls below the
     /// least stretch. Where one is there already, the halves may be a little worse, since more can be done with them;
-    /// not beside kept edges, where nothing can, and the losses of single splits multiply. Gives the new vertex.
+    /// not beside kept edges, where nothing can, and the losses of single splits multiply. A tied edge is split with
+    /// all that it is tied to. Gives the new vertex.
     ///
     /// # Errors
     /// The first test that refuses it; nothing is done then.
     pub fn split(&mut self, edge: EdgeId, at: DVec3) -> Result<VertexId, Refused> {
+        if let Some(group) = self.ties.of(self.mesh.ends(edge)) {
+            return self.split_tied(group, edge, at);
+        }
         let plan = check_split(&self.mesh, edge)?;
         let [p, q] = plan.ends.map(|v| self.mesh.point(v));
         let at = if plan.is_curve { Placement::Segment(p, q).nearest(at) } else { at };
+        self.fill_split(&[(plan, at)])?;
+        self.admit_split()?;
+        let v = split(&mut self.mesh, &plan, at);
+        self.follow_split(&[v]);
+        Ok(v)
+    }
+
+    /// Puts the halves of the faces at the edges into the patch.
+    pub(super) fn fill_split(&mut self, plans: &[(SplitPlan, DVec3)]) -> Result<(), Refused> {
         self.patch.clear();
-        self.halve_faces(&plan, at)?;
-        self.patch.is_same = closest_on_segment(at, [p, q]).distance_squared <= 1e-24 * p.distance_squared(q);
+        let first_new = self.mesh.face_slots();
+        let mut later: SmallVec<[(FaceId, [DVec3; 3]); 4]> = SmallVec::new();
+        let mut is_same = true;
+        for &(plan, at) in plans {
+            let [p, q] = plan.ends.map(|v| self.mesh.point(v));
+            is_same &= closest_on_segment(at, [p, q]).distance_squared <= 1e-24 * p.distance_squared(q);
+            let h = halfedge_of(plan.edge);
+            for side in [h, twin(h)] {
+                let (Some(face), Some(apex)) = (self.mesh.face(side), self.mesh.apex(side)) else { continue };
+                if self.mesh.valence(apex) >= self.limits.max_valence {
+                    return Err(Refused::Valence);
+                }
+                if self.patch.old.contains(&face) {
+                    return Err(Refused::Topology);
+                }
+                let ends = [self.mesh.origin(side), self.mesh.target(side)];
+                let mut near = [ends[0], ends[1], apex].map(|v| self.mesh.point(v));
+                let mut far = near;
+                near[1] = at;
+                far[0] = at;
+                // The half at the first end keeps the face's number.
+                let (kept, new) = if ends[0] == plan.ends[0] { (near, far) } else { (far, near) };
+                self.patch.change(face, kept);
+                later.push((FaceId::new(first_new + later.len()), new));
+            }
+        }
+        for (id, points) in later {
+            self.patch.succeed(id, points);
+        }
+        self.patch.is_same = is_same;
+        Ok(())
+    }
+
+    /// All tests of a split that fills the patch.
+    pub(super) fn admit_split(&mut self) -> Result<(), Refused> {
         if !self.split_keeps_stretch() {
             return Err(Refused::Shape);
         }
         if self.split_folds() {
             return Err(Refused::FoldOver);
         }
-        self.admit_patch()?;
-        let v = split(&mut self.mesh, &plan, at);
-        self.quadrics.found(&self.mesh, v);
-        self.counts.splits += 1;
-        self.settle();
-        Ok(v)
+        self.admit_patch()
     }
 
-    /// Puts the halves of the faces at the edge into the patch.
-    fn halve_faces(&mut self, plan: &SplitPlan, at: DVec3) -> Result<(), Refused> {
-        let h = halfedge_of(plan.edge);
-        let first_new = self.mesh.face_slots();
-        let mut later = Vec::with_capacity(2);
-        for side in [h, twin(h)] {
-            let (Some(face), Some(apex)) = (self.mesh.face(side), self.mesh.apex(side)) else { continue };
-            if self.mesh.valence(apex) >= self.limits.max_valence {
-                return Err(Refused::Valence);
-            }
-            let (from, to) = (self.mesh.origin(side), self.mesh.target(side));
-            let point = |v: VertexId| self.mesh.point(v);
-            let mut near = [from, to, apex].map(point);
-            let mut far = near;
-            near[1] = at;
-            far[0] = at;
-            // The half at the first end keeps the face's number.
-            let (kept, new) = if from == plan.ends[0] { (near, far) } else { (far, near) };
-            self.patch.change(face, kept);
-            later.push((FaceId::new(first_new + later.len()), new));
+    /// What follows a split that was done.
+    pub(super) fn follow_split(&mut self, made: &[VertexId]) {
+        for &v in made {
+            self.quadrics.found(&self.mesh, v);
         }
-        for (id, points) in later {
-            self.patch.succeed(id, points);
-        }
-        Ok(())
+        self.counts.splits += made.len();
+        self.settle();
     }
 
     /// Whether an edge of the face must stay as it is, so that nothing can be mended there.

@@ -40,6 +40,8 @@ pub struct Trial<'d> {
     draft: &'d Draft,
     mesh: HalfedgeMesh,
     edits: SmallVec<[(Edit, Done); 4]>,
+    /// Faces that a split has halved: which half keeps the number is for the mesh to say, not for the copy.
+    halved: SmallVec<[FaceId; 4]>,
     /// Planes and lines by vertex; empty where the tolerance is a certified distance.
     quadrics: Vec<[Quadric; 2]>,
 }
@@ -62,7 +64,8 @@ impl Draft {
         let of = |v: &VertexId| [*guarded.quadrics.planes(*v), guarded.quadrics.lines(*v)];
         let is_certified = guarded.keeper.is_certified();
         let quadrics = if is_certified { Vec::new() } else { self.copied.vertices.iter().map(of).collect() };
-        Trial { draft: self, mesh: self.copied.mesh.clone(), edits: SmallVec::new(), quadrics }
+        let (edits, halved) = (SmallVec::new(), SmallVec::new());
+        Trial { draft: self, mesh: self.copied.mesh.clone(), edits, halved, quadrics }
     }
 }
 
@@ -78,10 +81,18 @@ impl Trial<'_> {
     /// The first test that refuses it.
     pub fn with(&self, guarded: &GuardedMesh<'_>, edit: Edit) -> Result<Self, Refused> {
         let touched = edit.touched(&self.mesh)?;
+        // Beyond the faces that may change the copy ends, so that it would show one side of an edge only.
+        let cuts = matches!(edit, Edit::Flip { .. } | Edit::Split { .. });
+        if cuts && !touched.iter().all(|&f| self.draft.is_core(f)) {
+            return Err(Refused::Extent);
+        }
         let before: SmallVec<[Before; 16]> = touched.iter().map(|&f| Before::of(&self.mesh, f)).collect();
         let mut next = self.clone();
         let done = edit.apply(&mut next.mesh)?;
         next.edits.push((next.as_done(edit, done), done));
+        if matches!(edit, Edit::Split { .. }) {
+            next.halved.extend(touched.iter().copied());
+        }
         let made = (self.mesh.face_slots()..next.mesh.face_slots()).map(FaceId::new);
         let is_flip = matches!(edit, Edit::Flip { .. });
         for f in touched.iter().copied().filter(|&f| next.mesh.face_is_live(f)).chain(made) {
@@ -132,7 +143,11 @@ impl Trial<'_> {
         guarded.keeper.admits_point(planes, lines, at)
     }
 
+    /// Whether a face is what it was, under the same number on the mesh.
     fn is_unchanged(&self, f: FaceId) -> bool {
+        if self.halved.contains(&f) {
+            return false;
+        }
         let before = &self.draft.copied.mesh;
         let (mut old, mut new) = (before.corners(f), self.mesh.corners(f));
         old.sort_unstable();
