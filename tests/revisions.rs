@@ -36,6 +36,8 @@ const CASES: &[(&str, &str, &str)] = &[
     ("subdivide", "", "boundary = \"exact\""),
     ("refine", "max-edge = \"7%\"", ""),
     ("refine", "max-edge = \"9%\"", "keep = [\"top\"]"),
+    ("remesh", "max-size = \"15%\", tolerance = \"1%\"", ""),
+    ("remesh", "max-size = \"25%\", mean-stretch = 0.9", "keep = [\"top\"]"),
     ("improve-quality", "max-edge = \"9%\", tolerance = \"1%\"", ""),
     ("improve-quality", "max-edge = \"9%\", tolerance = \"1%\", tolerance-mode = \"quadric-rms\"", "only = [\"top\"]"),
     ("control-properties", "max-size = \"25%\", tolerance = \"2%\"", ""),

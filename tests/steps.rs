@@ -33,6 +33,7 @@ mod steps {
     mod q_morph_shapes;
     mod read;
     mod refine;
+    mod remesh;
     mod remove_features;
     mod repair;
     mod resolution;

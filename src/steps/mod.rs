@@ -12,6 +12,7 @@ pub mod partition;
 pub mod q_morph;
 pub mod read;
 pub mod refine;
+pub mod remesh;
 pub mod remove_features;
 pub mod repair;
 pub mod resolution;
@@ -33,6 +34,7 @@ pub static CATALOG: &[StepDef] = &[
     StepDef::of::<remove_features::Step>(),
     StepDef::of::<subdivide::Step>(),
     StepDef::of::<refine::Step>(),
+    StepDef::of::<remesh::Step>(),
     StepDef::of::<improve_quality::Step>(),
     StepDef::of::<control_properties::Step>(),
     StepDef::of::<simplify_fit::Step>(),

@@ -1,5 +1,6 @@
 //! What several steps share: algorithms on surfaces that are no step of their own.
 
+pub mod adaptive;
 pub mod arcs;
 pub mod aspect_point;
 pub mod belts;
@@ -29,6 +30,7 @@ pub mod patches;
 pub mod quadric;
 pub mod refine;
 pub mod remesh;
+pub mod sizing;
 pub mod split_curves;
 pub mod surface_curve;
 pub mod thickness;

@@ -81,7 +81,7 @@ fn quads(before: &Artifact, parameters: &str) -> (Soup, Produced<Value>) {
 fn curves_stay_within_the_feature_tolerance() {
     let before = marked(&shapes::cylinder(96, 12));
     let diagonal = measured(&before.to_soup().unwrap(), &before)("diagonal");
-    for step in ["control-properties", "improve-quality"] {
+    for step in ["control-properties", "improve-quality", "remesh"] {
         for share in [0.1, 0.5] {
             let made = run(step, &format!("tolerance = \"2%\", feature-tolerance = \"{share}%\""), &before);
             let figure = measured(&made.artifact.to_soup().unwrap(), &before);

@@ -84,7 +84,7 @@ impl Keeper<'_> {
 
 /// Reference curves and how far marked edges may lie from them.
 #[derive(Debug)]
-pub(super) struct Curves {
+pub struct Curves {
     segments: Vec<[DVec3; 2]>,
     tree: SegmentBvh,
     reach: f64,
@@ -95,17 +95,17 @@ const CHECK_BUDGET: usize = 256;
 
 impl Curves {
     /// Curves made of these segments.
-    pub(super) fn new(segments: Vec<[DVec3; 2]>, reach: f64) -> Self {
+    pub fn new(segments: Vec<[DVec3; 2]>, reach: f64) -> Self {
         Self { tree: SegmentBvh::new(segments.clone()), segments, reach }
     }
 
     /// The nearest point of the curves.
-    pub(super) fn project(&self, p: DVec3) -> Option<DVec3> {
+    pub fn project(&self, p: DVec3) -> Option<DVec3> {
         self.tree.closest(p).map(|c| c.nearest.point)
     }
 
     /// Whether a segment lies within reach of the curves: the set of points near one of their segments is convex.
-    pub(super) fn admit(&self, segment: [DVec3; 2]) -> bool {
+    pub fn admit(&self, segment: [DVec3; 2]) -> bool {
         let squared = self.reach * self.reach;
         let mut stack = vec![segment];
         for _ in 0..CHECK_BUDGET {

@@ -36,6 +36,7 @@ mod transaction;
 pub use collapse::{Collapse, Place, Site};
 pub use edit::Edit;
 pub use gain::Gain;
+pub use keeper::Curves;
 pub use limits::{Limits, SizeField, StarRules};
 pub use merge::Merge;
 pub use mesh::{Counts, GuardedMesh};

@@ -1,0 +1,322 @@
+//! Remeshing by sizes: edits first, one certificate after.
+//!
+//! # Algorithm
+//! Starting from the surface as it is, rounds of splits, collapses, flips and moves bring every edge near to the size
+//! wanted there. The size is the least of what is asked for, what the surface's curvature and that of its curves allow
+//! for the tolerance, and what strips between curves leave room for, graded along the mesh ([`super::sizing`]). Edits
+//! pass cheap tests only: topology, freedom, turned normals, shape. Then the whole is held against the reference, both
+//! ways, and against itself; where it lies too far off, sizes are lowered, points of the reference that would be lost
+//! draw vertices to them, and the rounds go on near there, now with samples of each new face held against the
+//! reference. What is left of poor faces is mended in a guarded mesh ([`super::guarded`]), which also certifies the
+//! result.
+//!
+//! Where the mean stretch stays below the one asked for, all is done again with sizes that grow more slowly. Where no
+//! certificate is reached, the surface is meshed in the guarded mesh from the beginning.
+//!
+//! Based on: M. Botsch, L. Kobbelt. A remeshing approach to multiresolution modeling. SGP 2004. M. Dunyach,
+//! D. Vanderhaeghe, L. Barthe, M. Botsch. Adaptive remeshing for real-time mesh deformation. Eurographics 2013, for
+//! sizes from curvature. X.-X. Cheng et al. Practical error-bounded remeshing by adaptive refinement. Computers and
+//! Graphics 82, 2019, for the loop of certificates.
+//!
+//! # Invariants
+//! - Topology, marked curves and kept elements stay; edges of curves stay within the curves' tolerance.
+//! - The report names a bound of the distance only where it was certified.
+//!
+//! # Cost
+//! O(F + result) edits a round, each a few projections, and a certificate for each lowering of sizes.
+
+mod certify;
+mod collapse;
+mod ending;
+mod flip;
+mod reference;
+mod smooth;
+mod split;
+mod work;
+
+use certify::{Memos, Verdict};
+use collapse::Comfort;
+use ending::{Ended, guarded_all_along, mend};
+use flip::Aim;
+use reference::Reference;
+use work::{Care, Work};
+
+use crate::mesh::bvh::TriangleBvh;
+use crate::mesh::halfedge::{EnterError, HalfedgeMesh};
+use crate::mesh::{FaceId, FreedomError, LockRules, Surface, resolve_freedom};
+use crate::technique::guarded::{Counts, SizeField};
+use crate::technique::refine::RefineError;
+use crate::watch::{Cancelled, Watch};
+
+/// The edge length wanted on each face of the reference.
+#[derive(Clone, Debug)]
+pub enum Wanted {
+    /// The same everywhere.
+    Uniform(f64),
+    /// By face.
+    Faces(Vec<f64>),
+}
+
+impl Wanted {
+    fn is_uniform(&self) -> bool {
+        matches!(self, Self::Uniform(_))
+    }
+
+    fn at(&self, f: FaceId) -> f64 {
+        match self {
+            Self::Uniform(size) => *size,
+            Self::Faces(sizes) => sizes[f.index()],
+        }
+    }
+
+    fn most(&self) -> f64 {
+        match self {
+            Self::Uniform(size) => *size,
+            Self::Faces(sizes) => sizes.iter().copied().fold(0.0, f64::max),
+        }
+    }
+}
+
+/// What to hold to; lengths in mesh units.
+#[derive(Clone, Debug)]
+pub struct Rules {
+    /// The edge length wanted where nothing asks for less.
+    pub size: Wanted,
+    /// No edge gets longer than this.
+    pub longest: f64,
+    /// The longest side of a face, where that differs from place to place; what breaks it is for the caller to name.
+    pub max_size: SizeField,
+    /// Sizes are not lowered below this.
+    pub least_size: f64,
+    /// Largest distance from the reference, both ways.
+    pub promise: f64,
+    /// The part of it that is used up before the end.
+    pub tolerance: f64,
+    /// The largest distance of curves from the reference's.
+    pub curve_tolerance: f64,
+    /// Least stretch of a face.
+    pub min_stretch: f64,
+    /// The mean stretch that is aimed for.
+    pub mean_stretch: f64,
+    /// Most edges at a vertex.
+    pub max_valence: usize,
+    /// No more faces than this are made.
+    pub most_faces: usize,
+}
+
+/// One way to go about it.
+#[derive(Clone, Copy, Debug)]
+struct Attempt {
+    /// How fast sizes grow along the surface.
+    gradation: f64,
+    /// What the faces of collapses beyond the sizes must reach.
+    comfort: Comfort,
+}
+
+/// What is remeshed.
+#[derive(Clone, Copy, Debug)]
+pub struct Input<'a> {
+    /// The surface, which is also the reference.
+    pub surface: &'a Surface,
+    /// What must stay.
+    pub locks: LockRules<'a>,
+}
+
+/// How it went.
+#[derive(Clone, Debug, Default)]
+pub struct Report {
+    /// Rounds of edits.
+    pub rounds: usize,
+    /// How often sizes were lowered after a certificate.
+    pub lowerings: usize,
+    /// Edits of all attempts.
+    pub edits: Counts,
+    /// Whether the guarded mesh had to do all of it.
+    pub is_guarded_all_along: bool,
+    /// The certified bound of the distance, where there is one.
+    pub bound: Option<f64>,
+}
+
+/// Why it could not be done.
+#[derive(Debug, thiserror::Error)]
+pub enum RemeshError {
+    /// The surface is none.
+    #[error(transparent)]
+    Enter(#[from] EnterError),
+    /// Locks that name what is not there.
+    #[error(transparent)]
+    Locks(#[from] FreedomError),
+    /// The surface cannot be refined.
+    #[error(transparent)]
+    Refine(#[from] RefineError),
+    /// Stopped from outside.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+}
+
+/// What the means of a good shape cost, one attempt after the other.
+const ATTEMPTS: [Attempt; 3] = [
+    Attempt { gradation: 0.4, comfort: [0.5, 0.75] },
+    Attempt { gradation: 0.28, comfort: [0.5, 0.75] },
+    Attempt { gradation: 0.25, comfort: [0.62, 0.87] },
+];
+/// A mean stretch that is missed by less does not make another attempt.
+const SLIGHTLY: f64 = 3e-4;
+/// What the mean stretch gains after the first rounds.
+const GAINED_LATER: f64 = 0.006;
+/// How often sizes are lowered where they prove too large.
+const LOWERINGS: usize = 12;
+/// And how often without one that leaves fewer faults.
+const PATIENCE: usize = 4;
+/// From which lowering on lost points of the reference draw vertices.
+const PULL_AFTER: usize = 1;
+/// Rounds of edits before the first certificate, and after each lowering of sizes.
+const ROUNDS: [usize; 2] = [5, 2];
+/// Strips between curves are looked at after so many rounds.
+const LOOK_AT_STRIPS: usize = 2;
+/// The needles of the input are cut up where a pass halves less than one edge for so many faces.
+const CUT_UP: usize = 20;
+/// Passes of collapses beyond the sizes.
+const COARSENINGS: usize = 3;
+/// What further passes ask for while the mean stretch is above the one aimed for by the margin.
+const LESS_COMFORT: [Comfort; 3] = [[0.45, 0.7], [0.45, 0.7], [0.45, 0.65]];
+const MARGIN: f64 = 0.01;
+/// Rounds of moves and flips for shape at the end of each turn; they end where fewer than one vertex in so many gains.
+const POLISH: usize = 8;
+const QUIET: usize = 200;
+
+/// Meshes a surface anew. `tree` is the hierarchy over it.
+///
+/// # Errors
+/// See [`RemeshError`]. That the tolerance could not be kept is no error: the report has no bound then.
+pub fn remesh(
+    input: &Input<'_>,
+    tree: &TriangleBvh,
+    rules: &Rules,
+    watch: &Watch,
+) -> Result<(Surface, Report), RemeshError> {
+    let freedom = resolve_freedom(input.surface, &input.locks)?;
+    let mesh = HalfedgeMesh::new(input.surface, &freedom)?;
+    let reference = Reference::new(input.surface, tree, &mesh, rules);
+    let mut report = Report::default();
+    let mut best: Option<(f64, Ended)> = None;
+    let again = [ATTEMPTS[0]];
+    for (place, attempt) in ATTEMPTS.into_iter().chain(again).enumerate() {
+        if place == ATTEMPTS.len() && best.is_some() {
+            break;
+        }
+        let mut work = Work::new(mesh.clone(), &reference, rules, attempt);
+        let is_last = place + 1 >= ATTEMPTS.len();
+        let least_mean = if is_last { 0.0 } else { rules.mean_stretch - GAINED_LATER };
+        let Some(verdict) = work.rounds(least_mean, &mut report, watch)? else { continue };
+        let mean = work.mean();
+        if verdict.is_clean() && best.as_ref().is_none_or(|(before, _)| mean > *before) {
+            let ended = mend(&work.mesh.leave().surface, input, tree, rules, watch)?;
+            best = Some((mean, ended)).filter(|(_, ended)| ended.bound.is_some()).or(best);
+        }
+        if best.as_ref().is_some_and(|(mean, _)| *mean >= rules.mean_stretch - SLIGHTLY) {
+            break;
+        }
+    }
+    let ended = if let Some((_, ended)) = best {
+        ended
+    } else {
+        report.is_guarded_all_along = true;
+        guarded_all_along(input, tree, rules, watch)?
+    };
+    report.bound = ended.bound;
+    report.edits = report.edits + ended.counts;
+    Ok((ended.surface, report))
+}
+
+impl Work<'_> {
+    /// Rounds of edits and certificates until one finds nothing, or the last. Returns what that has found; nothing
+    /// where the first rounds leave less than the mean stretch given.
+    fn rounds(&mut self, least_mean: f64, report: &mut Report, watch: &Watch) -> Result<Option<Verdict>, Cancelled> {
+        let mut memos = Memos::default();
+        self.set_sizes();
+        self.cut_up(watch)?;
+        self.turn(ROUNDS[0], watch)?;
+        report.rounds += ROUNDS[0];
+        if self.mean() < least_mean {
+            report.edits = report.edits + self.tally;
+            return Ok(None);
+        }
+        let mut verdict = self.certify(&mut memos, watch)?;
+        let mut fewest = (usize::MAX, 0);
+        for lowering in 1..=LOWERINGS {
+            fewest = if verdict.faults() < fewest.0 { (verdict.faults(), lowering) } else { fewest };
+            if verdict.is_clean() || lowering >= fewest.1 + PATIENCE {
+                break;
+            }
+            self.care = Care::Sizes;
+            self.lower(&verdict.wishes);
+            if lowering > PULL_AFTER {
+                self.pull(&verdict.lost);
+            }
+            self.care = Care::Samples;
+            self.turn(ROUNDS[1], watch)?;
+            report.rounds += ROUNDS[1];
+            report.lowerings += 1;
+            verdict = self.certify(&mut memos, watch)?;
+        }
+        report.edits = report.edits + self.tally;
+        Ok(Some(verdict))
+    }
+
+    /// Cuts the needles of the input up: halved all along they would be many times the faces that are wanted, so what
+    /// gets short on the way collapses at once.
+    fn cut_up(&mut self, watch: &Watch) -> Result<(), Cancelled> {
+        self.flip_all(Aim::Shape);
+        self.collapse_short();
+        self.flip_all(Aim::Shape);
+        self.care = Care::Needles;
+        for _ in 0..split::PASSES {
+            watch.check()?;
+            let before = self.mesh.face_count();
+            let halved = self.split_long(1);
+            self.collapse_short();
+            if halved <= before / CUT_UP {
+                break;
+            }
+        }
+        self.care = Care::Sizes;
+        Ok(())
+    }
+
+    /// Rounds of edits, then fewer and better faces.
+    fn turn(&mut self, rounds: usize, watch: &Watch) -> Result<(), Cancelled> {
+        watch.phase("remesh", Some(rounds as u64));
+        for round in 1..=rounds {
+            watch.check()?;
+            watch.advance(round as u64 - 1, || format!("{} faces", self.mesh.face_count()));
+            self.split_long(split::PASSES);
+            self.collapse_short();
+            self.flip_all(Aim::Valence);
+            self.flip_all(Aim::Shape);
+            self.smooth();
+            if round == LOOK_AT_STRIPS {
+                self.lower_in_strips();
+            }
+        }
+        let comforts = [self.attempt.comfort; COARSENINGS].into_iter().chain(LESS_COMFORT);
+        for (place, comfort) in comforts.enumerate() {
+            watch.check()?;
+            if place >= COARSENINGS && self.mean() < self.rules.mean_stretch + MARGIN {
+                break;
+            }
+            self.coarsen(comfort);
+            for _ in 0..2 {
+                self.improve();
+                self.flip_all(Aim::Worth);
+            }
+        }
+        for _ in 0..POLISH {
+            let gained = self.improve() + self.flip_all(Aim::Worth);
+            if gained <= self.mesh.vertex_count() / QUIET {
+                break;
+            }
+        }
+        Ok(())
+    }
+}
