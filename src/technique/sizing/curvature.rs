@@ -7,7 +7,7 @@
 //! face itself, so that a plane beside a round edge does not hide it.
 //!
 //! # Cost
-//! O(F), [`PASSES`] times.
+//! O(F), for each of a few passes.
 
 use glam::{DMat3, DVec3};
 
