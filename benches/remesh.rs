@@ -10,6 +10,7 @@ use meshmill::mesh::{LockRules, Surface};
 use meshmill::metric::distance::{Target, upper_bound};
 use meshmill::step::Length;
 use meshmill::steps::improve_quality::{ImproveQualityInput, ImproveQualityParams, improve_quality};
+use meshmill::steps::remesh::{RemeshParams, remesh};
 use meshmill::watch::Watch;
 
 /// Better shaped, within the tolerance of the pipelines, with half the faces.
@@ -51,5 +52,22 @@ fn edits(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, growth, edits);
+/// The whole step, at three sizes.
+fn whole(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("remesh");
+    group.sample_size(10);
+    for n in [125, 250, 500] {
+        let surface = shapes::torus(n);
+        group.throughput(Throughput::Elements(surface.faces.len() as u64));
+        group.bench_with_input(BenchmarkId::from_parameter(surface.faces.len()), &surface, |b, s| {
+            b.iter(|| {
+                let (params, locks) = (RemeshParams::default(), LockRules::default());
+                remesh(black_box(s), &params, &locks, &Watch::silent()).expect("a closed torus").0.faces.len()
+            });
+        });
+    }
+    group.finish();
+}
+
+criterion_group!(benches, growth, edits, whole);
 criterion_main!(benches);
