@@ -351,7 +351,7 @@ pub struct Step;
 
 impl StepContract for Step {
     const NAME: &'static str = "q-morph";
-    const REVISION: u32 = 18;
+    const REVISION: u32 = 19;
     const INPUTS: &'static [InputDef] = &[InputDef {
         name: "from",
         accepts: &[Port::Surface],
