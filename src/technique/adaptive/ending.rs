@@ -7,7 +7,7 @@ use crate::metric::ToleranceMode;
 use crate::technique::collapse::{CollapseRules, Goal, Order, Priority};
 use crate::technique::guarded::{Counts, GuardedMesh, Limits, Setup, StarRules, open};
 use crate::technique::refine::{Flips, MaxEdge, refine};
-use crate::technique::remesh::{coarsen, raise_stretch, touch_up};
+use crate::technique::remesh::{coarsen, mend_stubborn, raise_stretch, touch_up};
 use crate::watch::Watch;
 
 /// What faces are mended to, beyond the least stretch asked for.
@@ -36,6 +36,7 @@ pub(super) fn mend(
     let collapses = collapse_rules(rules);
     raise_stretch(&mut guarded, rules.min_stretch, &collapses, watch)?;
     touch_up(&mut guarded, BETTER.max(rules.min_stretch), &collapses, watch)?;
+    mend_stubborn(&mut guarded, &collapses, watch)?;
     Ok(end(guarded, rules))
 }
 

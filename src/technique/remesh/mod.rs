@@ -93,7 +93,7 @@ fn finish(
 
 /// Once more where faces are below the threshold still, and past it: what was done about their neighbours meanwhile,
 /// and what a higher aim changes round them, may have made room.
-fn mend_stubborn(guarded: &mut GuardedMesh<'_>, rules: &CollapseRules, watch: &Watch) -> Result<(), Cancelled> {
+pub fn mend_stubborn(guarded: &mut GuardedMesh<'_>, rules: &CollapseRules, watch: &Watch) -> Result<(), Cancelled> {
     for aim in HIGHER_AIMS {
         let aim = aim * rules.star.min_stretch;
         if faces_below(guarded, rules.star.min_stretch).is_empty() || aim > BETTER {
