@@ -65,6 +65,26 @@ fn included_files_are_read_and_a_change_of_any_makes_another_result() {
 }
 
 #[test]
+fn the_data_of_cards_is_read_from_their_files() {
+    let desk = Desk::new();
+    desk.write("deck/nodes.dat", NODES.trim_start_matches("*NODE\n"));
+    desk.write("deck/parts/faces.dat", "1, 1, 2, 3\n");
+    let cards = "*NODE, NSET=all, INPUT=nodes.dat\n*ELEMENT, TYPE=S3,\nELSET=skin, INPUT=parts\\faces.dat\n";
+    desk.write("deck/main.inp", cards);
+    desk.run().success();
+    assert!(desk.text("deck/o/result.obj").contains("g skin\nf 1 2 3"));
+    // A change of a file of data is a change of the input.
+    desk.write("deck/nodes.dat", "1, 0, 0, 0\n2, 8, 0, 0\n3, 0, 1, 0\n");
+    desk.run().success();
+    assert!(desk.text("deck/o/result.obj").contains("v 8 0 0"));
+    desk.write("deck/nodes.dat", "1, 0, 0, 0\n2, x, 0, 0\n3, 0, 1, 0\n");
+    refused(&desk, cards, "nodes.dat, line 2: ");
+    refused(&desk, "*NODE, INPUT=../secret.inc\n", "there is no such file");
+    desk.write("secret.inc", NODES);
+    refused(&desk, "*NODE, INPUT=../secret.inc\n", "it lies outside of");
+}
+
+#[test]
 fn decks_of_nastran_include_too() {
     let desk = Desk::new();
     desk.write("deck/grid.inc", "GRID,1,,0.,0.,0.\nGRID,2,,1.,0.,0.\nGRID,3,,0.,1.,0.\n");

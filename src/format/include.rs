@@ -4,6 +4,8 @@
 //!
 //! Abaqus and CalculiX write `*INCLUDE, INPUT=file`, Nastran `INCLUDE 'file'`, where a quoted name may go on in the
 //! next lines. A file may include others, at most [`DEEPEST`] deep; one that includes itself is refused.
+//! Abaqus' `*NODE, INPUT=file` and its kin take the data lines of one card from a file that holds nothing else: the card
+//! stays, and the lines stand below it.
 //!
 //! Linear in the size of all files; the caller bounds that.
 
@@ -21,7 +23,12 @@ pub const MOST_INCLUDES: usize = 10_000;
 const MOST_LINES: usize = 8;
 
 const BEGIN: &[u8] = b" meshmill: from here on, ";
+/// Begins the data of a card that stands in the lines before.
+const BEGIN_DATA: &[u8] = b" meshmill: data from here on, ";
 const END: &[u8] = b" meshmill: up to here";
+
+/// Cards of Abaqus whose data may stand in another file.
+pub(super) const TAKES_A_FILE: [&str; 5] = ["NODE", "ELEMENT", "NSET", "ELSET", "SURFACE"];
 
 /// An included file: what tells it from others, and its bytes.
 pub type Opened = (PathBuf, Vec<u8>);
@@ -58,10 +65,11 @@ pub(super) fn locate(bytes: &[u8], line: u64) -> (Option<String>, u64) {
             stack.pop();
             continue;
         }
-        if let Some(top) = stack.last_mut() {
+        let data = comment.strip_prefix(BEGIN_DATA);
+        if let Some(top) = stack.last_mut().filter(|_| data.is_none()) {
             top.1 += 1;
         }
-        if let Some(name) = comment.strip_prefix(BEGIN).filter(|_| number < line) {
+        if let Some(name) = comment.strip_prefix(BEGIN).or(data).filter(|_| number < line) {
             stack.push((Some(String::from_utf8_lossy(name).into_owned()), 0));
         }
     }
@@ -76,6 +84,8 @@ struct Directive {
     /// How many lines it has.
     lines: usize,
     name: String,
+    /// The card that takes its data from the file.
+    card: Option<String>,
 }
 
 /// The first directive at or after the line that begins at `from`.
@@ -85,7 +95,7 @@ fn next(format: Format, bytes: &[u8], from: usize) -> Option<Directive> {
         let end = line_end(bytes, begin);
         let line = bytes[begin..end].trim_ascii();
         let found = match format {
-            Format::Inp if is_keyword(line, b"*INCLUDE") => Some(inp_directive(bytes, begin)),
+            Format::Inp if line.starts_with(b"*") && !line.starts_with(b"**") => inp_directive(bytes, begin),
             Format::Bdf if is_keyword(line, b"INCLUDE") => Some(bdf_directive(bytes, begin)),
             // Nothing after it is read.
             Format::Bdf if line.get(..7).is_some_and(|w| w.eq_ignore_ascii_case(b"ENDDATA")) => return None,
@@ -109,8 +119,15 @@ fn is_keyword(line: &[u8], keyword: &[u8]) -> bool {
     word.eq_ignore_ascii_case(keyword) && rest.first().is_none_or(|b| !b.is_ascii_alphanumeric())
 }
 
-/// `*INCLUDE, INPUT=file`, which goes on in the next line after a comma at the end.
-fn inp_directive(bytes: &[u8], begin: usize) -> Directive {
+/// `*INCLUDE, INPUT=file`, or a card with its data in a file; either goes on in the next line after a comma at the end.
+fn inp_directive(bytes: &[u8], begin: usize) -> Option<Directive> {
+    let first = &bytes[begin..line_end(bytes, begin)];
+    let keyword = first.split(|&b| b == b',').next().unwrap_or(first).trim_ascii();
+    let keyword = String::from_utf8_lossy(keyword).trim_start_matches('*').trim().to_ascii_uppercase();
+    let includes = keyword == "INCLUDE";
+    if !includes && !TAKES_A_FILE.contains(&keyword.as_str()) {
+        return None;
+    }
     let (mut end, mut lines) = (begin, 0);
     let mut text = String::new();
     while (lines == 0 || text.ends_with(',')) && end < bytes.len() {
@@ -120,10 +137,16 @@ fn inp_directive(bytes: &[u8], begin: usize) -> Directive {
     }
     let input = |part: &str| {
         let (key, value) = part.split_once('=')?;
-        key.trim().eq_ignore_ascii_case("INPUT").then(|| value.trim().trim_matches(['"', '\'']).to_owned())
+        let is_file = |wanted: &str| key.trim().eq_ignore_ascii_case(wanted);
+        (is_file("INPUT") || !includes && is_file("FILE"))
+            .then(|| value.trim().trim_matches(['"', '\'']).trim().to_owned())
     };
-    let name = text.split(',').find_map(input).unwrap_or_default();
-    Directive { begin, end, lines, name }
+    let name = text.split(',').find_map(input);
+    if includes {
+        return Some(Directive { begin, end, lines, name: name.unwrap_or_default(), card: None });
+    }
+    let rest: Vec<&str> = text.split(',').filter(|part| input(part).is_none() && !part.trim().is_empty()).collect();
+    Some(Directive { begin, end, lines, name: name?, card: Some(rest.join(",")) })
 }
 
 /// `INCLUDE 'file'`, which goes on in the next lines until the quote ends.
@@ -133,7 +156,7 @@ fn bdf_directive(bytes: &[u8], begin: usize) -> Directive {
     let rest = line.trim().get("INCLUDE".len()..).unwrap_or_default().trim_start_matches([' ', '\t', '=']);
     let Some(quote) = rest.chars().next().filter(|c| matches!(c, '\'' | '"')) else {
         let name = rest.split([' ', '\t', '$']).next().unwrap_or_default().to_owned();
-        return Directive { begin, end, lines: 1, name };
+        return Directive { begin, end, lines: 1, name, card: None };
     };
     let mut name = rest[1..].trim_end().to_owned();
     let mut lines = 1;
@@ -143,7 +166,7 @@ fn bdf_directive(bytes: &[u8], begin: usize) -> Directive {
         (end, lines) = (after, lines + 1);
     }
     let name = name.split(quote).next().unwrap_or_default().to_owned();
-    Directive { begin, end, lines, name }
+    Directive { begin, end, lines, name, card: None }
 }
 
 struct Expansion<'a, 'b> {
@@ -187,18 +210,40 @@ impl Expansion<'_, '_> {
             return Err(Why::Here("the file includes itself".to_owned()));
         }
         let mark: &[u8] = if self.format == Format::Inp { b"**" } else { b"$" };
+        if let Some(card) = &directive.card {
+            self.out.extend([card.as_bytes(), b"\n"].concat());
+        }
         for _ in 1..directive.lines {
             self.out.extend([mark, b"\n"].concat());
         }
         let printable: String = directive.name.chars().map(|c| if c.is_control() { '_' } else { c }).collect();
-        self.out.extend([mark, BEGIN, printable.as_bytes(), b"\n"].concat());
+        let begin = if directive.card.is_some() { BEGIN_DATA } else { BEGIN };
+        self.out.extend([mark, begin, printable.as_bytes(), b"\n"].concat());
         self.stack.push((file, directive.name.clone()));
-        self.add(&bytes).map_err(|error| Why::Within(Box::new(error)))?;
+        match directive.card {
+            Some(_) => self.add_data(&bytes)?,
+            None => self.add(&bytes).map_err(|error| Why::Within(Box::new(error)))?,
+        }
         self.stack.pop();
         if self.out.last() != Some(&b'\n') {
             self.out.push(b'\n');
         }
         self.out.extend([mark, END, b"\n"].concat());
+        Ok(())
+    }
+
+    /// The data of a card: no keyword may stand among them.
+    fn add_data(&mut self, bytes: &[u8]) -> Result<(), Why> {
+        for (line, number) in bytes.split(|&b| b == b'\n').map(<[u8]>::trim_ascii).zip(1_u64..) {
+            if line.starts_with(b"*") && !line.starts_with(b"**") {
+                let place = Place::Line(number);
+                let mut error = FormatError::unexpected(place, "nothing but the data lines of one card", line)
+                    .with_remedy("take the file in by *INCLUDE, INPUT=, which may hold cards");
+                error.included = self.stack.last().map(|(_, name)| name.clone());
+                return Err(Why::Within(Box::new(error)));
+            }
+        }
+        self.out.extend_from_slice(bytes);
         Ok(())
     }
 
@@ -253,6 +298,36 @@ mod tests {
                 ("3, 0", (None, 3))
             ]
         );
+    }
+
+    #[test]
+    fn the_data_of_a_card_may_stand_in_another_file() {
+        let files = [("n.dat", "1, 0\n** said\n2, 0"), ("bad.dat", "1, 0\n*NODE\n2, 0\n")];
+        let deck = "*Node, nset=\"all nodes\",\n input = 'n.dat', system=R\n3, 0\n";
+        let text = expanded(Format::Inp, deck, &files).unwrap();
+        let lines: Vec<_> = (1..)
+            .zip(text.lines())
+            .filter(|(_, line)| !line.starts_with("**"))
+            .map(|(n, line)| (line, locate(text.as_bytes(), n)))
+            .collect();
+        let within = || Some("n.dat".to_owned());
+        assert_eq!(
+            lines,
+            [
+                ("*Node, nset=\"all nodes\", system=R", (None, 1)),
+                ("1, 0", (within(), 1)),
+                ("2, 0", (within(), 3)),
+                ("3, 0", (None, 3)),
+            ]
+        );
+        for untouched in ["*NODE, NSET=a\n", "*NODE PRINT, INPUT=n.dat\n", "*BOUNDARY, INPUT=n.dat\n", "** *NODE, INPUT=n.dat\n"]
+        {
+            assert_eq!(expanded(Format::Inp, untouched, &files).unwrap(), untouched);
+        }
+        let error = expanded(Format::Inp, "*ELEMENT, TYPE=S3, FILE=bad.dat\n", &files).unwrap_err();
+        assert!(error.contains("bad.dat, line 2: expected nothing but the data lines of one card"), "{error}");
+        let error = expanded(Format::Inp, "\n*ELSET, ELSET=a, INPUT=\n", &files).unwrap_err();
+        assert!(error.ends_with("line 2: `` is not included: the directive names no file"), "{error}");
     }
 
     #[test]

@@ -8,6 +8,7 @@ use glam::DVec3;
 use super::super::ReadCounts;
 use super::super::element::Shape;
 use super::super::error::{FormatError, Place, Reason};
+use super::super::include::TAKES_A_FILE;
 use super::super::text::{parse_integer, parse_number};
 use super::elements::element_type;
 use super::harmless::{MAKES_GEOMETRY, is_harmless};
@@ -61,9 +62,6 @@ pub(super) struct Reader<'a> {
     pub(super) unknown: BTreeMap<String, u64>,
     in_step: bool,
 }
-
-/// Cards whose data may stand in another file.
-const TAKES_A_FILE: [&str; 5] = ["NODE", "ELEMENT", "NSET", "ELSET", "SURFACE"];
 
 /// Reads an input file.
 pub(super) fn read(bytes: &[u8], watch: &Watch) -> Result<(Soup, ReadCounts), FormatError> {
@@ -126,7 +124,7 @@ impl Reader<'_> {
                 place,
                 Reason::Unsupported(format!("data of *{name} in another file ({file})")),
             )
-            .with_remedy("put the file's lines below the card"));
+            .with_remedy("give the deck the ending .inp, so that the file is looked for, or put its lines below the card"));
         }
         self.block = match name.as_str() {
             "NODE" => {
