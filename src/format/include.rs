@@ -320,7 +320,8 @@ mod tests {
                 ("3, 0", (None, 3)),
             ]
         );
-        for untouched in ["*NODE, NSET=a\n", "*NODE PRINT, INPUT=n.dat\n", "*BOUNDARY, INPUT=n.dat\n", "** *NODE, INPUT=n.dat\n"]
+        for untouched in
+            ["*NODE, NSET=a\n", "*NODE PRINT, INPUT=n.dat\n", "*BOUNDARY, INPUT=n.dat\n", "** *NODE, INPUT=n.dat\n"]
         {
             assert_eq!(expanded(Format::Inp, untouched, &files).unwrap(), untouched);
         }

@@ -124,7 +124,9 @@ impl Reader<'_> {
                 place,
                 Reason::Unsupported(format!("data of *{name} in another file ({file})")),
             )
-            .with_remedy("give the deck the ending .inp, so that the file is looked for, or put its lines below the card"));
+            .with_remedy(
+                "give the deck the ending .inp, so that the file is looked for, or put its lines below the card",
+            ));
         }
         self.block = match name.as_str() {
             "NODE" => {
