@@ -36,6 +36,9 @@ fn grid_points_take_the_default_system_of_the_deck() {
     is(&triangle(&format!("GRDSET,,5\n{SHIFTED}"), "0").unwrap(), &plain);
     is(&triangle("GRDSET,,,,,,6\n", "").unwrap(), &plain);
     is(&triangle(SHIFTED, "").unwrap(), &plain);
+    is(&triangle(&format!("GRDSET,,5\nGRDSET,,5\n{SHIFTED}"), "").unwrap(), &shifted);
+    let two = triangle(&format!("GRDSET,,5\nGRDSET,,0\n{SHIFTED}"), "").unwrap_err();
+    assert!(two.contains("line 6: a second GRDSET, with another coordinate system, is not supported"), "{two}");
 }
 
 #[test]

@@ -65,6 +65,21 @@ fn included_files_are_read_and_a_change_of_any_makes_another_result() {
 }
 
 #[test]
+fn a_name_is_looked_for_in_the_folder_of_the_deck_then_beside_the_file_that_has_it() {
+    let desk = Desk::new();
+    desk.write("deck/parts/mesh.inc", "\u{feff}*INCLUDE, INPUT=nodes.inc\n*ELEMENT, TYPE=S3\n1, 1, 2, 3\n");
+    desk.run().success();
+    assert!(desk.text("deck/o/result.obj").contains("v 1 0 0"));
+    // A file in the deck's folder comes first, also where it comes later.
+    desk.write("deck/nodes.inc", &NODES.replace("2, 1, 0", "2, 6, 0"));
+    desk.run().success();
+    assert!(desk.text("deck/o/result.obj").contains("v 6 0 0"));
+    desk.write("deck/parts/mesh.inc", "*INCLUDE, INPUT=../../secret.inc\n");
+    desk.write("secret.inc", NODES);
+    refused(&desk, MAIN, "`../../secret.inc` is not included: it lies outside of");
+}
+
+#[test]
 fn the_data_of_cards_is_read_from_their_files() {
     let desk = Desk::new();
     desk.write("deck/nodes.dat", NODES.trim_start_matches("*NODE\n"));

@@ -26,7 +26,6 @@ const STRIDE: usize = 1 << 16;
 const MOST_COLUMNS: usize = 4096;
 
 fn read(bytes: &[u8], watch: &Watch) -> ReadResult {
-    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     let mut reader = ReaderBuilder::new().delimiter(delimiter(bytes)).from_reader(bytes);
     let names: Vec<String> = reader
         .byte_headers()

@@ -9,10 +9,11 @@
 //!
 //! Linear in the size of all files; the caller bounds that.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use super::Format;
 use super::error::{FormatError, Place, Reason};
+use super::text::without_mark;
 
 /// So deep files may include each other.
 pub const DEEPEST: usize = 16;
@@ -32,8 +33,9 @@ pub(super) const TAKES_A_FILE: [&str; 5] = ["NODE", "ELEMENT", "NSET", "ELSET", 
 
 /// An included file: what tells it from others, and its bytes.
 pub type Opened = (PathBuf, Vec<u8>);
-/// Opens a file by the name that the deck gives it, or says why not.
-pub type Open<'a> = dyn FnMut(&str) -> Result<Opened, String> + 'a;
+/// Opens a file by the name that the deck gives it, or says why not; the second argument is the included file that
+/// names it, none for the deck itself.
+pub type Open<'a> = dyn FnMut(&str, Option<&Path>) -> Result<Opened, String> + 'a;
 
 impl Format {
     /// Whether files of this format may include others.
@@ -205,7 +207,9 @@ impl Expansion<'_, '_> {
         if self.count > MOST_INCLUDES {
             return Err(Why::Here(format!("the deck has more than {MOST_INCLUDES} includes")));
         }
-        let (file, bytes) = (self.open)(&directive.name).map_err(Why::Here)?;
+        let within = self.stack.last().map(|(file, _)| file.as_path());
+        let (file, bytes) = (self.open)(&directive.name, within).map_err(Why::Here)?;
+        let bytes = without_mark(&bytes);
         if self.stack.iter().any(|(known, _)| *known == file) {
             return Err(Why::Here("the file includes itself".to_owned()));
         }
@@ -221,8 +225,8 @@ impl Expansion<'_, '_> {
         self.out.extend([mark, begin, printable.as_bytes(), b"\n"].concat());
         self.stack.push((file, directive.name.clone()));
         match directive.card {
-            Some(_) => self.add_data(&bytes)?,
-            None => self.add(&bytes).map_err(|error| Why::Within(Box::new(error)))?,
+            Some(_) => self.add_data(bytes)?,
+            None => self.add(bytes).map_err(|error| Why::Within(Box::new(error)))?,
         }
         self.stack.pop();
         if self.out.last() != Some(&b'\n') {
@@ -273,7 +277,7 @@ mod tests {
     use super::*;
 
     fn expanded(format: Format, deck: &str, files: &[(&str, &str)]) -> Result<String, String> {
-        let mut open = |name: &str| match files.iter().find(|(known, _)| *known == name) {
+        let mut open = |name: &str, _: Option<&Path>| match files.iter().find(|(known, _)| *known == name) {
             Some((_, text)) => Ok((PathBuf::from(name), text.as_bytes().to_vec())),
             None => Err("there is no such file".to_owned()),
         };

@@ -205,7 +205,8 @@ impl Format {
 
     /// The format that the content looks like.
     pub fn from_content(bytes: &[u8]) -> Option<Self> {
-        Self::ALL.iter().copied().find(|f| (f.def().sniff)(bytes))
+        let text = text::without_mark(bytes);
+        Self::ALL.iter().copied().find(|f| (f.def().sniff)(text))
     }
 
     /// The format of a file: by its ending, else by its content.
@@ -223,11 +224,13 @@ impl Format {
 /// # Errors
 /// Where the file is damaged, with the line or byte; when `watch` is cancelled.
 pub fn read(format: Format, bytes: &[u8], watch: &Watch) -> ReadResult {
-    if text::is_utf16(bytes) && !(format == Format::Stl && stl::binary_size_fits(bytes)) {
+    let binary_stl = format == Format::Stl && stl::binary_size_fits(bytes);
+    if !binary_stl && text::is_utf16(bytes) {
         return Err(FormatError::new(Place::File, Reason::Unsupported("UTF-16".to_owned()))
             .in_format(format)
             .with_remedy("the file is UTF-16: save it as UTF-8"));
     }
+    let bytes = if binary_stl { bytes } else { text::without_mark(bytes) };
     (format.def().read)(bytes, watch).map_err(|error| {
         let mut error = error.in_format(format);
         if let (true, Place::Line(line)) = (format.has_includes(), error.place) {

@@ -72,7 +72,7 @@ fn sniff(bytes: &[u8]) -> bool {
 }
 
 fn scanner(bytes: &[u8]) -> Scanner<'_> {
-    Scanner::new(bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes)).with_comments(b'#').with_continuation()
+    Scanner::new(bytes).with_comments(b'#').with_continuation()
 }
 
 fn read(bytes: &[u8], watch: &Watch) -> ReadResult {

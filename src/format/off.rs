@@ -58,7 +58,7 @@ fn sniff(bytes: &[u8]) -> bool {
 }
 
 fn read(bytes: &[u8], watch: &Watch) -> ReadResult {
-    let mut scanner = Scanner::new(bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes)).with_comments(b'#');
+    let mut scanner = Scanner::new(bytes).with_comments(b'#');
     let variant = read_keyword(&mut scanner)?;
     if variant.binary {
         scanner.next_line();

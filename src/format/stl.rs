@@ -52,12 +52,12 @@ pub(super) fn binary_size_fits(bytes: &[u8]) -> bool {
 }
 
 fn begins_with_solid(bytes: &[u8]) -> bool {
-    let start = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes).trim_ascii_start();
+    let start = bytes.trim_ascii_start();
     start.get(..5).is_some_and(|word| word.eq_ignore_ascii_case(b"solid"))
 }
 
 fn looks_like_text(bytes: &[u8]) -> bool {
-    let start = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes).trim_ascii_start();
+    let start = bytes.trim_ascii_start();
     // A comment may stand before it, in a line of its own; then the error tells of that.
     let solid = start[..start.len().min(4096)].split(|&b| b == b'\n').any(begins_with_solid);
     // The name may be in any encoding, but no text has control bytes.
@@ -145,7 +145,7 @@ fn binary_not_finite(bytes: &[u8], facet: usize, corner: usize) -> FormatError {
 type Solids = Vec<(String, usize)>;
 
 fn read_text(bytes: &[u8], watch: &Watch) -> ReadResult {
-    let mut scanner = Scanner::new(bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes));
+    let mut scanner = Scanner::new(bytes);
     let mut welder = Welder::new(bytes.len() / 500);
     let mut faces = Vec::new();
     let mut solids = Solids::new();

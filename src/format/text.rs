@@ -192,6 +192,11 @@ pub(super) fn is_utf16(bytes: &[u8]) -> bool {
     bytes.starts_with(b"\xff\xfe") || bytes.starts_with(b"\xfe\xff") || zero_at(0) || zero_at(1)
 }
 
+/// The bytes after a mark of UTF-8 at their beginning, which some editors write.
+pub(super) fn without_mark(bytes: &[u8]) -> &[u8] {
+    bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes)
+}
+
 /// `count` as a size, when it is not negative and at most `room`.
 pub(super) fn claim(count: i64, room: usize, what: &'static str, place: Place) -> Result<usize, FormatError> {
     match usize::try_from(count) {

@@ -1,8 +1,9 @@
 //! Files that a run reads, with those that they include: one content, one hash, and a list of all files behind it.
 //!
 //! A deck with includes counts as the deck with their lines in place, so that a change of any of them is a change of
-//! the input. A file is included by its name relative to the deck's folder, and only from below it: no path and no link
-//! leads out. All included files together have at most [`MOST_BYTES`].
+//! the input. A file is included by its name relative to the deck's folder, else relative to the folder of the included
+//! file that names it, and only from below the deck's folder: no path and no link leads out. All included files together
+//! have at most [`MOST_BYTES`].
 
 use std::collections::BTreeSet;
 use std::io;
@@ -124,13 +125,22 @@ impl Folder {
 
     fn expand(&mut self, deck: &Path, bytes: &[u8]) -> Result<Option<Vec<u8>>, FormatError> {
         let Some(format) = format_of(deck) else { return Ok(None) };
-        expand(format, bytes, &mut |name| self.open(name))
+        expand(format, bytes, &mut |name, within| self.open(name, within))
     }
 
-    fn open(&mut self, name: &str) -> Result<Opened, String> {
+    /// Opens a file by the name in the deck, or in an included file.
+    fn open(&mut self, name: &str, within: Option<&Path>) -> Result<Opened, String> {
         // Decks from Windows.
-        let path = self.path.join(name.replace('\\', "/"));
+        let name = name.replace('\\', "/");
+        let mut path = self.path.join(&name);
         self.included.insert(path.clone());
+        if let Some(folder) = within.and_then(Path::parent)
+            && !path.exists()
+            && folder.join(&name).exists()
+        {
+            path = folder.join(&name);
+            self.included.insert(path.clone());
+        }
         let system = |error: io::Error| match error.kind() {
             io::ErrorKind::NotFound => format!("there is no such file in {}", self.path.display()),
             _ => error.to_string(),

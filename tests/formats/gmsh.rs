@@ -52,6 +52,12 @@ const FOUR: &str = "$MeshFormat\n4 0 8\n$EndMeshFormat\n$PhysicalNames\n1\n2 1 \
     $Elements\n1 1\n8 2 2 1\n1 1 2 3\n$EndElements\n";
 
 #[test]
+fn version_1_is_named() {
+    let error = read(Format::Msh, b"$NOD\n1\n1 0 0 0\n$ENDNOD\n", &Watch::silent()).unwrap_err();
+    assert!(error.remedy.as_ref().is_some_and(|remedy| remedy.contains("version 1")), "{error:?}");
+}
+
+#[test]
 fn version_4_0_is_read_however_it_is_written() {
     for head in ["4 0 8", "4.0 0 8"] {
         let soup = mesh(&FOUR.replace("4 0 8", head)).unwrap();

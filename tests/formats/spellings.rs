@@ -55,6 +55,25 @@ fn decimal_commas_are_read_where_they_can_be_nothing_else() {
 }
 
 #[test]
+fn a_mark_of_utf_8_is_no_part_of_any_text() {
+    let nodes = "1, 0, 0, 0\n2, 1, 0, 0\n3, 0, 1, 0\n";
+    let inp = format!("*NODE\n{nodes}*ELEMENT, TYPE=S3\n1, 1, 2, 3\n");
+    let bdf = "GRID,1,,0.,0.,0.\nGRID,2,,1.,0.,0.\nGRID,3,,0.,1.,0.\nCTRIA3,1,1,1,2,3\n";
+    let ply = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
+        element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+    let vtk = "# vtk DataFile Version 3.0\nx\nASCII\nDATASET POLYDATA\nPOINTS 3 float\n0 0 0 1 0 0 0 1 0\n\
+        POLYGONS 1 4\n3 0 1 2\n";
+    let off = "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+    let formats =
+        [(Format::Inp, &*inp), (Format::Bdf, bdf), (Format::Ply, ply), (Format::Vtk, vtk), (Format::Off, off)];
+    for (format, text) in formats {
+        let marked = format!("\u{feff}{text}");
+        assert_eq!(outcome(format, marked.as_bytes()), Ok((1, Vec::new())), "{marked}");
+        assert_eq!(Format::from_content(marked.as_bytes()), Format::from_content(text.as_bytes()), "{marked}");
+    }
+}
+
+#[test]
 fn text_before_a_solid_is_named() {
     for before in ["; exported by hand\n", "# a\n# b\n"] {
         let error = stl(&format!("{before}{SOLID}")).unwrap_err();

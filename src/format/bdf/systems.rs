@@ -82,7 +82,7 @@ pub(super) struct Grid {
 pub(super) struct Systems {
     given: BTreeMap<i64, Definition>,
     found: BTreeMap<i64, Frame>,
-    default: i64,
+    default: Option<i64>,
 }
 
 impl Systems {
@@ -90,7 +90,12 @@ impl Systems {
     pub(super) fn card(&mut self, card: &Card) -> Result<bool, FormatError> {
         let kind = match card.name.as_bytes() {
             b"GRDSET" => {
-                self.default = card.integer(1, "a coordinate system")?.unwrap_or(0);
+                let system = card.integer(1, "a coordinate system")?.unwrap_or(0);
+                if self.default.is_some_and(|before| before != system) {
+                    let what = "a second GRDSET, with another coordinate system,".to_owned();
+                    return Err(FormatError::new(card.place(), Reason::Unsupported(what)));
+                }
+                self.default = Some(system);
                 return Ok(true);
             }
             [b'C', b'O', b'R', b'D', b'1' | b'2', kind] => match kind {
@@ -157,7 +162,7 @@ impl Systems {
         grid: &dyn Fn(i64) -> Option<usize>,
         depth: usize,
     ) -> Result<DVec3, FormatError> {
-        let frame = self.frame(given.system.unwrap_or(self.default), given.line, grids, grid, depth)?;
+        let frame = self.frame(given.system.or(self.default).unwrap_or(0), given.line, grids, grid, depth)?;
         Ok(frame.basic(given.point))
     }
 

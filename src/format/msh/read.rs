@@ -15,7 +15,7 @@ const HARMLESS: [&[u8]; 6] =
 
 /// Reads a Gmsh file.
 pub(super) fn read(bytes: &[u8], watch: &Watch) -> Result<(Soup, ReadCounts), FormatError> {
-    let mut input = Input::new(bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes));
+    let mut input = Input::new(bytes);
     let mut model = Model::new(watch);
     let version = mesh_format(&mut input)?;
     let version_4 = version != Version::Two;
@@ -68,7 +68,11 @@ enum Version {
 fn mesh_format(input: &mut Input<'_>) -> Result<Version, FormatError> {
     let first = input.need_word("the head")?;
     if first != b"$MeshFormat" {
-        return Err(FormatError::unexpected(input.place(), "$MeshFormat", first));
+        let error = FormatError::unexpected(input.place(), "$MeshFormat", first);
+        return Err(match first {
+            b"$NOD" => error.with_remedy("the file has version 1: save it in Gmsh anew: gmsh -save -format msh41 FILE"),
+            _ => error,
+        });
     }
     let version = input.need_word("the version")?;
     let version = match version {
