@@ -4,8 +4,8 @@
 //!
 //! Abaqus and CalculiX write `*INCLUDE, INPUT=file`, Nastran `INCLUDE 'file'`, where a quoted name may go on in the
 //! next lines. A file may include others, at most [`DEEPEST`] deep; one that includes itself is refused.
-//! Abaqus' `*NODE, INPUT=file` and its kin take the data lines of one card from a file that holds nothing else: the card
-//! stays, and the lines stand below it.
+//! Abaqus' `*NODE, INPUT=file` and its kin take the data lines of one card from a file that holds nothing else: the
+//! card stays, and the lines stand below it.
 //!
 //! Linear in the size of all files; the caller bounds that.
 

@@ -2,8 +2,8 @@
 //!
 //! A deck with includes counts as the deck with their lines in place, so that a change of any of them is a change of
 //! the input. A file is included by its name relative to the deck's folder, else relative to the folder of the included
-//! file that names it, and only from below the deck's folder: no path and no link leads out. All included files together
-//! have at most [`MOST_BYTES`].
+//! file that names it, and only from below the deck's folder: no path and no link leads out. All included files
+//! together have at most [`MOST_BYTES`].
 
 use std::collections::BTreeSet;
 use std::io;
