@@ -2,6 +2,7 @@
 
 pub mod adaptive;
 pub mod arcs;
+pub mod arrange;
 pub mod aspect_point;
 pub mod belts;
 pub mod clean_quads;
