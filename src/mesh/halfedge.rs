@@ -14,12 +14,14 @@
 
 mod enter;
 mod leave;
+mod seams;
 #[cfg(test)]
 pub(crate) mod tests;
 
 use glam::DVec3;
 
-use super::carried::{EdgeMark, Freedom, MarkCause, SeamId};
+use self::seams::Seams;
+use super::carried::{EdgeMark, Freedom, MarkCause};
 use super::classes::{ClassId, Classes};
 use super::id::{EdgeId, Face, FaceId, Halfedge, HalfedgeId, IdVec, Vertex, VertexId};
 use std::collections::BTreeMap;
@@ -111,7 +113,7 @@ pub struct HalfedgeMesh {
     pub(super) face_classes: Classes,
     pub(super) names: Names,
     pub(super) pins: BTreeMap<VertexId, Freedom>,
-    pub(super) seams: BTreeMap<VertexId, SeamId>,
+    pub(super) seams: Seams,
     pub(super) live_vertices: usize,
     pub(super) live_edges: usize,
     pub(super) live_faces: usize,
@@ -411,11 +413,6 @@ impl HalfedgeMesh {
     /// Whether a vertex or an edge at it belongs to a group of its own kind.
     pub fn is_grouped(&self, v: VertexId) -> bool {
         self.vertex_class[v] != 0 || self.outgoing(v).any(|h| self.edge_class[edge_of(h)] != 0)
-    }
-
-    /// The seam a vertex lies on.
-    pub fn seam(&self, v: VertexId) -> Option<SeamId> {
-        self.seams.get(&v).copied()
     }
 
     /// Changes whenever the star of the vertex changes.

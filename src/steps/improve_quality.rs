@@ -375,7 +375,7 @@ pub struct Step;
 
 impl crate::step::Step for Step {
     const NAME: &'static str = "improve-quality";
-    const REVISION: u32 = 17;
+    const REVISION: u32 = 18;
     const INPUTS: &'static [InputDef] = &[
         InputDef { name: "from", accepts: &[Port::Surface], required: true, doc: "the surface to improve" },
         REFERENCE,

@@ -124,6 +124,29 @@ fn scale_by_powers_of_two_and_mirrors_change_nothing_that_counts() {
     }
 }
 
+#[test]
+fn any_number_of_threads_makes_the_same_mesh() {
+    let before = marked(&shapes::torus(48, 24));
+    let made = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let made = pool.install(|| run("remesh", "max-size = \"3%\", tolerance = \"0.2%\"", &before));
+        (made.artifact.to_soup().unwrap(), made.stats)
+    };
+    let one = made(1);
+    assert!(one.0.faces.len() > 3000, "{}", one.0.faces.len());
+    for threads in [2, 5, 8] {
+        assert!(made(threads) == one, "{threads} threads");
+    }
+}
+
+#[test]
+fn vertices_in_the_bottom_of_small_holes_lose_edges() {
+    // A disc of 24 faces that meet in one vertex, whose rim must stay.
+    let mesh = shapes::cylinder(24, 1);
+    let made = run("remesh", "max-size = \"100%\", tolerance = \"0.5%\", max-valence = 8", &marked(&mesh));
+    assert!(made.stats["max-valence"].as_u64().unwrap() <= 8, "{}", made.stats["max-valence"]);
+}
+
 fn surface_of(surface: Surface) -> Artifact {
     Artifact::Surface(std::sync::Arc::new(surface))
 }

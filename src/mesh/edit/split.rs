@@ -9,7 +9,7 @@ use glam::DVec3;
 use smallvec::SmallVec;
 
 use super::Refusal;
-use crate::mesh::carried::{Freedom, SeamId};
+use crate::mesh::carried::Freedom;
 use crate::mesh::halfedge::{EdgeState, HalfedgeMesh, NONE, halfedge_of, twin};
 use crate::mesh::id::{EdgeId, FaceId, HalfedgeId, VertexId};
 
@@ -58,10 +58,9 @@ pub fn split(mesh: &mut HalfedgeMesh, plan: &SplitPlan, wish: DVec3) -> VertexId
 /// are all copies. Where they are of a seam, the new vertices are on a new seam. Returns those, in order.
 pub fn split_copies(mesh: &mut HalfedgeMesh, copies: &[(SplitPlan, DVec3)]) -> SmallVec<[VertexId; 3]> {
     let made: SmallVec<[VertexId; 3]> = copies.iter().map(|(plan, at)| halve(mesh, plan, *at)).collect();
-    let is_on_seam = copies.iter().all(|(plan, _)| plan.ends.iter().all(|v| mesh.seams.contains_key(v)));
+    let is_on_seam = copies.iter().all(|(plan, _)| plan.ends.iter().all(|v| mesh.seams.contains(*v)));
     if is_on_seam {
-        let next = mesh.seams.values().map(|seam| seam.0 + 1).max().unwrap_or(0);
-        mesh.seams.extend(made.iter().map(|&v| (v, SeamId(next))));
+        mesh.seams.add(&made);
     }
     made
 }

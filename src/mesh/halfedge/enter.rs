@@ -3,6 +3,7 @@
 //! Half-edges are bucketed by their smaller end and paired inside the bucket, so edges are numbered by their ends.
 //! O(F) time for bounded valence, O(F log F) at worst; 16 bytes a half-edge of scratch memory.
 
+use super::seams::Seams;
 use super::{EdgeState, HalfedgeId, HalfedgeMesh, NONE, Names};
 use crate::mesh::carried::{Freedom, edge_key};
 use crate::mesh::classes::{ClassId, Classes};
@@ -110,7 +111,7 @@ impl HalfedgeMesh {
             face_classes: Classes::new(names.face_groups.len() + regions),
             names,
             pins: surface.carried.pins.clone(),
-            seams: surface.carried.seams.clone(),
+            seams: Seams::new(&surface.carried.seams),
             live_vertices: vertices,
             live_edges: 0,
             live_faces: faces,

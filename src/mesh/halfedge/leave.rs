@@ -75,7 +75,7 @@ impl HalfedgeMesh {
         }
         let survivors = |v: &VertexId| vertices.get(*v);
         carried.pins = self.pins.iter().filter_map(|(v, &pin)| Some((survivors(v)?, pin))).collect();
-        carried.seams = self.seams.iter().filter_map(|(v, &seam)| Some((survivors(v)?, seam))).collect();
+        carried.seams = self.seams.iter().filter_map(|(v, seam)| Some((survivors(&v)?, seam))).collect();
         carried
     }
 

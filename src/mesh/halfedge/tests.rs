@@ -1,7 +1,7 @@
 //! Entering and leaving on tiny meshes.
 
 use super::*;
-use crate::mesh::{Carried, EdgeMark, MarkCause, Regions, ResolvedFreedom, Surface, edge_key};
+use crate::mesh::{Carried, EdgeMark, MarkCause, Regions, ResolvedFreedom, SeamId, Surface, edge_key};
 
 pub(crate) fn surface(points: &[[f64; 3]], faces: &[[u32; 3]]) -> Surface {
     Surface {

@@ -313,7 +313,7 @@ pub struct Step;
 
 impl crate::step::Step for Step {
     const NAME: &'static str = "control-properties";
-    const REVISION: u32 = 18;
+    const REVISION: u32 = 19;
     const INPUTS: &'static [InputDef] = &[
         InputDef { name: "from", accepts: &[Port::Surface], required: true, doc: "the surface to simplify" },
         REFERENCE,

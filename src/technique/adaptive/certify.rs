@@ -13,9 +13,9 @@ use crate::metric::intersection::faces_of;
 use crate::watch::{Cancelled, Watch};
 
 /// Sizes are lowered by what the distance asks for, but by no less and no more than these at once.
-const AT_ONCE: [f64; 2] = [0.5, 0.85];
+const AT_ONCE: [f64; 2] = [0.5, 0.93];
 /// The part of the tolerance that new sizes aim for.
-const AIM: f64 = 0.7;
+const AIM: f64 = 0.88;
 /// How far beyond the tolerance faces count that intersect.
 const CROSSING: f64 = 2.0;
 /// Strips between curves get edges up to so many times their width.

@@ -3,6 +3,7 @@
 use glam::DVec3;
 use smallvec::SmallVec;
 
+use super::ahead::scattered;
 use super::work::{Care, Corners, Faces, Work, stretch};
 use crate::mesh::edit::{CollapsePlan, Placement, check_collapse, collapse};
 use crate::mesh::halfedge::{edge_of, twin};
@@ -33,11 +34,7 @@ impl Work<'_> {
         let mut waiting = self.awake_edges();
         for _ in 0..PASSES {
             let mut kept = Vec::new();
-            for e in waiting {
-                if self.mesh.edge_is_live(e) && self.length(e) < SHORT * self.size_of(e) {
-                    kept.extend(self.collapse_edge(e, None));
-                }
-            }
+            self.collapse_in_turn(&scattered(waiting), SHORT, None, |v| kept.push(v));
             if kept.is_empty() {
                 break;
             }
@@ -57,19 +54,37 @@ impl Work<'_> {
         let mut short: Vec<(f64, EdgeId)> = self.awake_edges().into_iter().map(|e| (part(self, e), e)).collect();
         short.retain(|&(part, _)| part < COARSE);
         short.sort_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
-        for (_, e) in short {
-            if self.mesh.edge_is_live(e) && part(self, e) < COARSE {
-                self.tally.collapses += usize::from(self.collapse_edge(e, Some(comfort)).is_some());
-            }
-        }
+        let short: Vec<EdgeId> = short.into_iter().map(|(_, e)| e).collect();
+        let mut done = 0;
+        self.collapse_in_turn(&short, COARSE, Some(comfort), |_| done += 1);
+        self.tally.collapses += done;
     }
 
-    /// Collapses an edge to the better of its ends where the cheap tests admit it. Returns the vertex that stays.
-    fn collapse_edge(&mut self, e: EdgeId, comfort: Option<Comfort>) -> Option<VertexId> {
+    /// Collapses those of the edges that are shorter than `part` of their size, as far as the cheap tests admit it.
+    /// Tells the vertices that stay.
+    fn collapse_in_turn(
+        &mut self,
+        edges: &[EdgeId],
+        part: f64,
+        comfort: Option<Comfort>,
+        mut tell: impl FnMut(VertexId),
+    ) {
+        let look = |work: &Self, e: EdgeId| {
+            let is_short = work.mesh.edge_is_live(e) && work.length(e) < part * work.size_of(e);
+            is_short.then(|| work.plan_collapse(e, comfort)).flatten()
+        };
+        self.in_turn(edges, Self::near_edge, look, |work, _, (plan, end)| {
+            work.collapse_to(&plan, end);
+            tell(plan.kept);
+        });
+    }
+
+    /// The collapse of an edge, and the better of its ends as the place to collapse to.
+    fn plan_collapse(&self, e: EdgeId, comfort: Option<Comfort>) -> Option<(CollapsePlan, VertexId)> {
         let plan = check_collapse(&self.mesh, e).ok()?;
         let ends = [plan.kept, plan.removed];
         let is_pinned = ends.iter().any(|v| self.pinned[v.index()]);
-        if is_pinned || plan.new_valence(&self.mesh) > self.rules.max_valence {
+        if is_pinned || plan.new_valence(&self.mesh) > self.most_edges(plan.kept) {
             return None;
         }
         let count = if matches!(plan.placement, Placement::Fixed(_)) { 1 } else { 2 };
@@ -81,18 +96,20 @@ impl Work<'_> {
                 best = Some((least, end));
             }
         }
-        let (_, end) = best?;
+        best.map(|(_, end)| (plan, end))
+    }
+
+    pub(super) fn collapse_to(&mut self, plan: &CollapsePlan, end: VertexId) {
         let (at, foot) = (self.point(end), self.feet[end.index()]);
-        collapse(&mut self.mesh, &plan, at);
+        collapse(&mut self.mesh, plan, at);
         self.sizing.merged(plan.kept, plan.removed);
         self.feet[plan.kept.index()] = foot;
         self.wake(plan.kept);
-        Some(plan.kept)
     }
 
     /// The least stretch after a collapse to `at`; `None` where a test refuses it.
     fn rate(&self, plan: &CollapsePlan, at: DVec3, comfort: Option<Comfort>) -> Option<f64> {
-        if !self.curve_admits(plan, at) {
+        if !self.curve_admits(plan, at) || !self.keeps_lengths(plan, at, comfort.is_some()) {
             return None;
         }
         let mut old: Faces = plan.removed_faces(&self.mesh).into_iter().flatten().collect();
@@ -101,7 +118,6 @@ impl Work<'_> {
             old.push(f);
             new.push((f, corners.map(|v| if v == plan.kept { at } else { self.point(v) })));
         }
-        let longest = self.excess_after(plan, at, comfort.is_some())?;
         let before = old.iter().map(|&f| self.quality(f)).fold(1.0, f64::min);
         let shapes: SmallVec<[f64; 16]> = new.iter().map(|&(_, corners)| stretch(corners)).collect();
         let least = shapes.iter().copied().fold(f64::INFINITY, f64::min);
@@ -111,29 +127,21 @@ impl Work<'_> {
         {
             return None;
         }
-        let is_sampled = comfort.is_some() || self.care == Care::Samples || longest > 1.0;
         let faces: SmallVec<[Corners; 16]> = new.iter().map(|&(_, corners)| corners).collect();
-        (!is_sampled || self.is_near(&old, &faces, plan.kept)).then_some(least)
+        self.is_near(&old, &faces, plan.kept).then_some(least)
     }
 
-    /// How many times longer than it should be the longest edge at the merged vertex gets; `None` where that is too
-    /// long.
-    fn excess_after(&self, plan: &CollapsePlan, at: DVec3, may_stretch: bool) -> Option<f64> {
+    /// Whether no edge at the merged vertex gets too long.
+    fn keeps_lengths(&self, plan: &CollapsePlan, at: DVec3, may_stretch: bool) -> bool {
         let size = self.sizing.at(plan.kept).min(self.sizing.at(plan.removed));
         let most = if self.care == Care::Needles { self.longest_spoke(plan) } else { 0.0 };
         // Past the size there is a hard limit only where it is the same everywhere.
         let factor = if may_stretch && self.rules.size.is_uniform() { STRETCHED } else { LONG };
         let ring = [plan.removed, plan.kept].into_iter().flat_map(|v| self.mesh.neighbours(v));
-        let mut excess = 0.0_f64;
-        for v in ring.filter(|&v| v != plan.kept && v != plan.removed) {
-            let length = at.distance(self.point(v));
+        ring.filter(|&v| v != plan.kept && v != plan.removed).all(|v| {
             let limit = (0.5 * factor * (size + self.sizing.at(v))).min(self.rules.longest);
-            if length > limit.max(most) {
-                return None;
-            }
-            excess = excess.max(length / limit);
-        }
-        Some(excess)
+            at.distance(self.point(v)) <= limit.max(most)
+        })
     }
 
     /// The longest edge at both ends of the edge that collapses.
@@ -143,7 +151,7 @@ impl Work<'_> {
     }
 
     /// Whether the curve through the edge stays near the reference's.
-    fn curve_admits(&self, plan: &CollapsePlan, at: DVec3) -> bool {
+    pub(super) fn curve_admits(&self, plan: &CollapsePlan, at: DVec3) -> bool {
         let edge = edge_of(plan.halfedge);
         if self.mesh.edge_freedom(edge) != Freedom::OnCurve {
             return true;

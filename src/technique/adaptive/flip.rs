@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 
+use super::ahead::scattered;
 use super::smooth::worth;
 use super::work::{Care, Corners, Work, stretch};
 use crate::mesh::edit::{FlipPlan, check_flip, flip};
@@ -55,15 +56,15 @@ impl Work<'_> {
         let mut done = 0;
         for _ in 0..PASSES {
             let mut near = Vec::new();
-            for e in waiting {
-                if self.mesh.edge_is_live(e) && self.flip_edge(e, aim) {
-                    done += 1;
-                    let h = halfedge_of(e);
-                    for k in [h, twin(h)] {
-                        near.extend([edge_of(self.mesh.next(k)), edge_of(self.mesh.prev(k))]);
-                    }
+            let look = |work: &Self, e| work.plan_flip(e, aim);
+            self.in_turn(&scattered(waiting), Self::near_edge, look, |work, e, plan| {
+                flip(&mut work.mesh, &plan);
+                done += 1;
+                let h = halfedge_of(e);
+                for k in [h, twin(h)] {
+                    near.extend([edge_of(work.mesh.next(k)), edge_of(work.mesh.prev(k))]);
                 }
-            }
+            });
             if near.is_empty() {
                 break;
             }
@@ -75,32 +76,32 @@ impl Work<'_> {
         done
     }
 
-    fn flip_edge(&mut self, e: EdgeId, aim: Aim) -> bool {
-        let Ok(plan) = check_flip(&self.mesh, e) else { return false };
+    /// The flip of an edge where it gains.
+    fn plan_flip(&self, e: EdgeId, aim: Aim) -> Option<FlipPlan> {
+        if !self.mesh.edge_is_live(e) {
+            return None;
+        }
+        let plan = check_flip(&self.mesh, e).ok()?;
         let h = halfedge_of(e);
-        let (Some(left), Some(right)) = (self.mesh.face(h), self.mesh.face(twin(h))) else { return false };
-        let old = [left, right];
+        let old = [self.mesh.face(h)?, self.mesh.face(twin(h))?];
         if !self.valences_admit(&plan) || (aim == Aim::Valence && !self.evens(&plan)) {
-            return false;
+            return None;
         }
         let new = plan.new_faces().map(|corners| corners.map(|v| self.point(v)));
         if !gains(old.map(|f| self.quality(f)), new.map(stretch), aim) || self.turns(old, new) {
-            return false;
+            return None;
         }
         let [a, b] = plan.apexes.map(|v| self.point(v));
         let is_near = self.stays_near(&plan, old)
             && (self.care != Care::Samples || self.is_near(&old, &new, plan.apexes[0]))
             && a.distance(b) <= self.rules.longest.max(self.length(e));
-        if is_near {
-            flip(&mut self.mesh, &plan);
-        }
-        is_near
+        is_near.then_some(plan)
     }
 
     fn valences_admit(&self, plan: &FlipPlan) -> bool {
         let least = |v: VertexId| if self.mesh.is_boundary_vertex(v) { 2 } else { 3 };
         plan.ends.iter().all(|&v| self.mesh.valence(v) > least(v))
-            && plan.apexes.iter().all(|&v| self.mesh.valence(v) < self.rules.max_valence)
+            && plan.apexes.iter().all(|&v| self.mesh.valence(v) < self.most_edges(v))
     }
 
     /// Whether valences come nearer to six, at a rim to four.
@@ -118,7 +119,7 @@ impl Work<'_> {
     }
 
     /// Whether a new face turns away from both old ones.
-    fn turns(&self, old: [FaceId; 2], new: [Corners; 2]) -> bool {
+    pub(super) fn turns(&self, old: [FaceId; 2], new: [Corners; 2]) -> bool {
         let sum: DVec3 = old.iter().map(|&f| area_vector(self.mesh.corner_points(f)).normalize_or_zero()).sum();
         new.iter().any(|&corners| {
             let normal = area_vector(corners);
@@ -127,7 +128,7 @@ impl Work<'_> {
     }
 
     /// Whether the new diagonal stays near the reference, or nearer than the old one.
-    fn stays_near(&self, plan: &FlipPlan, old: [FaceId; 2]) -> bool {
+    pub(super) fn stays_near(&self, plan: &FlipPlan, old: [FaceId; 2]) -> bool {
         let [m, n] = old.map(|f| area_vector(self.mesh.corner_points(f)));
         if m.dot(n) >= FLAT * m.length() * n.length() {
             return true;

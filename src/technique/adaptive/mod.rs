@@ -6,12 +6,14 @@
 //! for the tolerance, and what strips between curves leave room for, graded along the mesh ([`super::sizing`]). Edits
 //! pass cheap tests only: topology, freedom, turned normals, shape. Then the whole is held against the reference, both
 //! ways, and against itself; where it lies too far off, sizes are lowered, points of the reference that would be lost
-//! draw vertices to them, and the rounds go on near there, now with samples of each new face held against the
-//! reference. What is left of poor faces is mended in a guarded mesh ([`super::guarded`]), which also certifies the
-//! result.
+//! draw vertices to them, folds are undone, and the rounds go on near there, now with samples of each new face held
+//! against the reference. Where the mean stretch is below the one asked for, the rounds go on with sizes that grow more
+//! slowly along the mesh; where it is above, further collapses use it up. What is left of poor faces is mended in a
+//! guarded mesh ([`super::guarded`]), which also certifies the result.
 //!
-//! Where the mean stretch stays below the one asked for, all is done again with sizes that grow more slowly. Where no
-//! certificate is reached, the surface is meshed in the guarded mesh from the beginning.
+//! Where no certificate is reached, all is done again with other sizes, and then in the guarded mesh from the beginning.
+//!
+//! Passes decide on edits on all threads, and do them in one order: the result is the same for any number.
 //!
 //! Based on: M. Botsch, L. Kobbelt. A remeshing approach to multiresolution modeling. SGP 2004. M. Dunyach,
 //! D. Vanderhaeghe, L. Barthe, M. Botsch. Adaptive remeshing for real-time mesh deformation. Eurographics 2013, for
@@ -25,6 +27,7 @@
 //! # Cost
 //! O(F + result) edits a round, each a few projections, and a certificate for each lowering of sizes.
 
+mod ahead;
 mod certify;
 mod collapse;
 mod ending;
@@ -32,9 +35,11 @@ mod flip;
 mod reference;
 mod smooth;
 mod split;
+mod unfold;
+mod valence;
 mod work;
 
-use certify::{Memos, Verdict};
+use certify::Memos;
 use collapse::Comfort;
 use ending::{Ended, guarded_all_along, mend};
 use flip::Aim;
@@ -104,15 +109,6 @@ pub struct Rules {
     pub most_faces: usize,
 }
 
-/// One way to go about it.
-#[derive(Clone, Copy, Debug)]
-struct Attempt {
-    /// How fast sizes grow along the surface.
-    gradation: f64,
-    /// What the faces of collapses beyond the sizes must reach.
-    comfort: Comfort,
-}
-
 /// What is remeshed.
 #[derive(Clone, Copy, Debug)]
 pub struct Input<'a> {
@@ -154,16 +150,22 @@ pub enum RemeshError {
     Cancelled(#[from] Cancelled),
 }
 
-/// What the means of a good shape cost, one attempt after the other.
-const ATTEMPTS: [Attempt; 3] = [
-    Attempt { gradation: 0.4, comfort: [0.5, 0.75] },
-    Attempt { gradation: 0.28, comfort: [0.5, 0.75] },
-    Attempt { gradation: 0.25, comfort: [0.62, 0.87] },
-];
+/// How fast sizes grow at first; the second where edits have led into a fold that none of them mends, and all is done
+/// again.
+const STARTS: [f64; 2] = [0.4, 0.27];
+/// How often sizes are made to grow more slowly for the sake of the mean stretch.
+const SLOWER: usize = 4;
+/// The mean stretch gains about so much where they grow by one less over a unit of length.
+const STEEP: f64 = 0.2;
+/// By how much less they grow at once, and how much at least.
+const AT_ONCE: [f64; 2] = [0.02, 0.1];
+const SLOWEST: f64 = 0.15;
+/// What the faces of collapses beyond the sizes must reach.
+const COMFORT: Comfort = [0.5, 0.75];
 /// A mean stretch that is missed by less does not make another attempt.
 const SLIGHTLY: f64 = 3e-4;
-/// What the mean stretch gains after the first rounds.
-const GAINED_LATER: f64 = 0.006;
+/// What the mean stretch loses where sizes are lowered.
+const LOST_LATER: f64 = 0.001;
 /// How often sizes are lowered where they prove too large.
 const LOWERINGS: usize = 12;
 /// And how often without one that leaves fewer faults.
@@ -180,7 +182,7 @@ const CUT_UP: usize = 20;
 const COARSENINGS: usize = 3;
 /// What further passes ask for while the mean stretch is above the one aimed for by the margin.
 const LESS_COMFORT: [Comfort; 3] = [[0.45, 0.7], [0.45, 0.7], [0.45, 0.65]];
-const MARGIN: f64 = 0.01;
+const MARGIN: f64 = 0.002;
 /// Rounds of moves and flips for shape at the end of each turn; they end where fewer than one vertex in so many gains.
 const POLISH: usize = 8;
 const QUIET: usize = 200;
@@ -199,50 +201,72 @@ pub fn remesh(
     let mesh = HalfedgeMesh::new(input.surface, &freedom)?;
     let reference = Reference::new(input.surface, tree, &mesh, rules);
     let mut report = Report::default();
-    let mut best: Option<(f64, Ended)> = None;
-    let again = [ATTEMPTS[0]];
-    for (place, attempt) in ATTEMPTS.into_iter().chain(again).enumerate() {
-        if place == ATTEMPTS.len() && best.is_some() {
-            break;
-        }
-        let mut work = Work::new(mesh.clone(), &reference, rules, attempt);
-        let is_last = place + 1 >= ATTEMPTS.len();
-        let least_mean = if is_last { 0.0 } else { rules.mean_stretch - GAINED_LATER };
-        let Some(verdict) = work.rounds(least_mean, &mut report, watch)? else { continue };
-        let mean = work.mean();
-        if verdict.is_clean() && best.as_ref().is_none_or(|(before, _)| mean > *before) {
-            let ended = mend(&work.mesh.leave().surface, input, tree, rules, watch)?;
-            best = Some((mean, ended)).filter(|(_, ended)| ended.bound.is_some()).or(best);
-        }
-        if best.as_ref().is_some_and(|(mean, _)| *mean >= rules.mean_stretch - SLIGHTLY) {
-            break;
+    for gradation in STARTS {
+        let mut work = Work::new(mesh.clone(), &reference, rules, gradation);
+        let best = work.attempts(&mut report, watch)?;
+        report.edits = report.edits + work.tally;
+        if let Some(best) = best {
+            let ended = mend(&best.leave().surface, input, tree, rules, watch)?;
+            if ended.bound.is_some() {
+                return Ok(report.ended(ended));
+            }
         }
     }
-    let ended = if let Some((_, ended)) = best {
-        ended
-    } else {
-        report.is_guarded_all_along = true;
-        guarded_all_along(input, tree, rules, watch)?
-    };
-    report.bound = ended.bound;
-    report.edits = report.edits + ended.counts;
-    Ok((ended.surface, report))
+    report.is_guarded_all_along = true;
+    let ended = guarded_all_along(input, tree, rules, watch)?;
+    Ok(report.ended(ended))
+}
+
+impl Report {
+    fn ended(mut self, ended: Ended) -> (Surface, Self) {
+        self.bound = ended.bound;
+        self.edits = self.edits + ended.counts;
+        (ended.surface, self)
+    }
 }
 
 impl Work<'_> {
-    /// Rounds of edits and certificates until one finds nothing, or the last. Returns what that has found; nothing
-    /// where the first rounds leave less than the mean stretch given.
-    fn rounds(&mut self, least_mean: f64, report: &mut Report, watch: &Watch) -> Result<Option<Verdict>, Cancelled> {
+    /// Rounds of edits and certificates, with sizes that grow more slowly each time that the mean stretch stays below
+    /// the one asked for. Returns the best mesh for which a certificate has found nothing.
+    fn attempts(&mut self, report: &mut Report, watch: &Watch) -> Result<Option<HalfedgeMesh>, Cancelled> {
         let mut memos = Memos::default();
+        let mut best: Option<(f64, HalfedgeMesh)> = None;
         self.set_sizes();
         self.cut_up(watch)?;
-        self.turn(ROUNDS[0], watch)?;
-        report.rounds += ROUNDS[0];
-        if self.mean() < least_mean {
-            report.edits = report.edits + self.tally;
-            return Ok(None);
+        self.turn(ROUNDS[0], report, watch)?;
+        for slower in 0..=SLOWER {
+            let lacks = self.rules.mean_stretch + LOST_LATER - self.mean();
+            if slower == SLOWER || lacks <= 0.0 || !self.grow_slower(lacks) {
+                if !self.until_clean(&mut memos, report, watch)? {
+                    break;
+                }
+                let mean = self.mean();
+                if best.as_ref().is_none_or(|(before, _)| mean > *before) {
+                    best = Some((mean, self.mesh.clone()));
+                }
+                let lacks = self.rules.mean_stretch - mean;
+                if lacks <= SLIGHTLY || !self.grow_slower(lacks) {
+                    break;
+                }
+            }
+            self.turn(ROUNDS[1], report, watch)?;
         }
-        let mut verdict = self.certify(&mut memos, watch)?;
+        Ok(best.map(|(_, mesh)| mesh))
+    }
+
+    /// Lets sizes grow more slowly for a mean stretch that lacks so much; whether they may.
+    fn grow_slower(&mut self, lacks: f64) -> bool {
+        let before = self.sizing.bounds().gradation;
+        let may = before > SLOWEST;
+        if may {
+            self.begin((before - (lacks / STEEP).clamp(AT_ONCE[0], AT_ONCE[1])).max(SLOWEST));
+        }
+        may
+    }
+
+    /// Certificates and rounds of edits where they fail, until one finds nothing; whether it came to that.
+    fn until_clean(&mut self, memos: &mut Memos, report: &mut Report, watch: &Watch) -> Result<bool, Cancelled> {
+        let mut verdict = self.certify(memos, watch)?;
         let mut fewest = (usize::MAX, 0);
         for lowering in 1..=LOWERINGS {
             fewest = if verdict.faults() < fewest.0 { (verdict.faults(), lowering) } else { fewest };
@@ -250,18 +274,17 @@ impl Work<'_> {
                 break;
             }
             self.care = Care::Sizes;
+            self.unfold(verdict.wishes.iter().map(|&(v, _)| v));
             self.lower(&verdict.wishes);
             if lowering > PULL_AFTER {
                 self.pull(&verdict.lost);
             }
             self.care = Care::Samples;
-            self.turn(ROUNDS[1], watch)?;
-            report.rounds += ROUNDS[1];
+            self.turn(ROUNDS[1], report, watch)?;
             report.lowerings += 1;
-            verdict = self.certify(&mut memos, watch)?;
+            verdict = self.certify(memos, watch)?;
         }
-        report.edits = report.edits + self.tally;
-        Ok(Some(verdict))
+        Ok(verdict.is_clean())
     }
 
     /// Cuts the needles of the input up: halved all along they would be many times the faces that are wanted, so what
@@ -285,12 +308,16 @@ impl Work<'_> {
     }
 
     /// Rounds of edits, then fewer and better faces.
-    fn turn(&mut self, rounds: usize, watch: &Watch) -> Result<(), Cancelled> {
+    fn turn(&mut self, rounds: usize, report: &mut Report, watch: &Watch) -> Result<(), Cancelled> {
+        report.rounds += rounds;
         watch.phase("remesh", Some(rounds as u64));
         for round in 1..=rounds {
             watch.check()?;
             watch.advance(round as u64 - 1, || format!("{} faces", self.mesh.face_count()));
             self.split_long(split::PASSES);
+            if self.care == Care::Samples {
+                self.settle();
+            }
             self.collapse_short();
             self.flip_all(Aim::Valence);
             self.flip_all(Aim::Shape);
@@ -299,7 +326,7 @@ impl Work<'_> {
                 self.lower_in_strips();
             }
         }
-        let comforts = [self.attempt.comfort; COARSENINGS].into_iter().chain(LESS_COMFORT);
+        let comforts = [COMFORT; COARSENINGS].into_iter().chain(LESS_COMFORT);
         for (place, comfort) in comforts.enumerate() {
             watch.check()?;
             if place >= COARSENINGS && self.mean() < self.rules.mean_stretch + MARGIN {
@@ -311,6 +338,7 @@ impl Work<'_> {
                 self.flip_all(Aim::Worth);
             }
         }
+        self.relieve();
         for _ in 0..POLISH {
             let gained = self.improve() + self.flip_all(Aim::Worth);
             if gained <= self.mesh.vertex_count() / QUIET {

@@ -6,6 +6,7 @@
 use glam::DVec3;
 use smallvec::SmallVec;
 
+use super::ahead::{Near, scattered};
 use super::work::{Care, Corners, Faces, Work, stretch};
 use crate::mesh::edit::{relocate, slide};
 use crate::mesh::geometry::area_vector;
@@ -37,6 +38,17 @@ pub(super) fn worth(stretch: f64) -> f64 {
     stretch - LACK * (POOR - stretch).max(0.0)
 }
 
+/// Vertices farther off than this part of the tolerance go back, and leave no face below this stretch.
+const OFF: f64 = 0.3;
+const SPOILT: f64 = 0.02;
+
+/// Where a vertex may go, and the face of the reference there.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Place {
+    pub(super) at: DVec3,
+    pub(super) foot: FaceId,
+}
+
 /// The sides opposite a vertex.
 type Sides = SmallVec<[[DVec3; 2]; 12]>;
 
@@ -48,26 +60,54 @@ fn worth_at(p: DVec3, sides: &[[DVec3; 2]]) -> f64 {
 impl Work<'_> {
     /// Moves every vertex to the middle of its star.
     pub(super) fn smooth(&mut self) {
-        for v in self.awake_vertices() {
-            match self.mesh.vertex_freedom(v) {
-                Freedom::Free if !self.mesh.is_boundary_vertex(v) => self.centre(v),
-                Freedom::OnCurve => self.even(v),
-                Freedom::Free | Freedom::Keep => {}
-            }
-        }
+        self.move_in_turn(Self::centred, Self::evened);
     }
 
-    fn centre(&mut self, v: VertexId) {
+    /// Puts vertices that lie off the reference back on it, at the cost of shapes: halves of edges that cut a corner stay
+    /// behind where faces would have turned.
+    pub(super) fn settle(&mut self) {
+        let squared = (OFF * self.rules.tolerance).powi(2);
+        let look = |work: &Self, v: VertexId| {
+            let is_inner = work.mesh.vertex_freedom(v) == Freedom::Free && !work.mesh.is_boundary_vertex(v);
+            let foot =
+                is_inner.then(|| work.project(work.point(v), v)).filter(|foot| foot.distance_squared > squared)?;
+            (work.reference.normal(foot.face).dot(work.normal_at(v)) > 0.0).then_some(foot)
+        };
+        let care = std::mem::replace(&mut self.care, Care::Sizes);
+        let near = |_: &Self, v: VertexId| Near::from_slice(&[v]);
+        self.in_turn(&scattered(self.awake_vertices()), near, look, |work, v, foot| {
+            work.move_to(v, foot.point, foot.face, SPOILT);
+        });
+        self.care = care;
+    }
+
+    /// Moves vertices to where one search or the other, for those on curves, says. Returns how many.
+    fn move_in_turn(
+        &mut self,
+        free: impl Fn(&Self, VertexId) -> Option<Place> + Sync,
+        on_curve: impl Fn(&Self, VertexId) -> Option<Place> + Sync,
+    ) -> usize {
+        let vertices = scattered(self.awake_vertices());
+        let look = |work: &Self, v: VertexId| match work.mesh.vertex_freedom(v) {
+            Freedom::Free if !work.mesh.is_boundary_vertex(v) => free(work, v),
+            Freedom::OnCurve => on_curve(work, v),
+            Freedom::Free | Freedom::Keep => None,
+        };
+        let mut moved = 0;
+        let near = |_: &Self, v: VertexId| Near::from_slice(&[v]);
+        self.in_turn(&vertices, near, look, |work, v, place| moved += usize::from(work.go_to(v, place)));
+        moved
+    }
+
+    fn centred(&self, v: VertexId) -> Option<Place> {
         let at = self.point(v);
-        let Some((step, normal)) = self.towards_middle(v) else { return };
+        let (step, normal) = self.towards_middle(v)?;
         let least = self.least_at(v, at).min(ENOUGH);
-        for share in SHARES {
+        SHARES.into_iter().find_map(|share| {
             let foot = self.project(at + share * step, v);
             let is_here = self.reference.normal(foot.face).dot(normal) > SAME_SIDE;
-            if is_here && self.move_to(v, foot.point, foot.face, least) {
-                return;
-            }
-        }
+            (is_here && self.may_go(v, foot.point, least)).then_some(Place { at: foot.point, foot: foot.face })
+        })
     }
 
     /// The way to the middle of the star in its tangent plane, where faces that are wanted smaller weigh more, and the
@@ -91,37 +131,43 @@ impl Work<'_> {
     }
 
     /// Moves a vertex along its curve to the middle of its neighbours there, nearer to where edges are wanted shorter.
-    fn even(&mut self, v: VertexId) {
-        let Some([a, b]) = self.curve_neighbours(v) else { return };
+    fn evened(&self, v: VertexId) -> Option<Place> {
+        let [a, b] = self.curve_neighbours(v)?;
         let (p, q) = (self.point(a), self.point(b));
         let [s, t] = [a, b].map(|w| self.sizing.at(v) + self.sizing.at(w));
         let middle = p + s / (s + t) * (q - p);
         let least = self.least_at(v, self.point(v)).min(ENOUGH);
-        if let Some(to) = self.reference.curves.project(middle) {
-            self.slide_to(v, to, least);
-        }
+        self.place_on_curve(v, self.reference.curves.project(middle)?, least)
     }
 
     /// Moves a free vertex where no face folds or falls below the least stretch.
     pub(super) fn move_to(&mut self, v: VertexId, to: DVec3, foot: FaceId, least: f64) -> bool {
-        if !self.may_go(v, to, least) || relocate(&mut self.mesh, v, to).is_err() {
-            return false;
+        self.may_go(v, to, least) && self.go_to(v, Place { at: to, foot })
+    }
+
+    /// Moves a vertex to a place that was found fit for it.
+    pub(super) fn go_to(&mut self, v: VertexId, place: Place) -> bool {
+        let done = match self.mesh.vertex_freedom(v) {
+            Freedom::OnCurve => slide(&mut self.mesh, v, place.at).is_ok(),
+            Freedom::Free | Freedom::Keep => relocate(&mut self.mesh, v, place.at).is_ok(),
+        };
+        if done {
+            self.feet[v.index()] = place.foot;
+            self.tally.moves += 1;
         }
-        self.feet[v.index()] = foot;
-        self.tally.moves += 1;
-        true
+        done
     }
 
     /// The same along a curve, where that stays near the reference's.
     pub(super) fn slide_to(&mut self, v: VertexId, to: DVec3, least: f64) -> bool {
-        let Some(ends) = self.curve_neighbours(v) else { return false };
+        self.place_on_curve(v, to, least).is_some_and(|place| self.go_to(v, place))
+    }
+
+    /// A place for a vertex of a curve, where that stays near the reference's.
+    fn place_on_curve(&self, v: VertexId, to: DVec3, least: f64) -> Option<Place> {
+        let ends = self.curve_neighbours(v)?;
         let near = ends.iter().all(|&w| self.reference.curves.admit([to, self.point(w)]));
-        if !near || !self.may_go(v, to, least) || slide(&mut self.mesh, v, to).is_err() {
-            return false;
-        }
-        self.feet[v.index()] = self.project(to, v).face;
-        self.tally.moves += 1;
-        true
+        (near && self.may_go(v, to, least)).then(|| Place { at: to, foot: self.project(to, v).face })
     }
 
     fn may_go(&self, v: VertexId, to: DVec3, least: f64) -> bool {
@@ -138,16 +184,7 @@ impl Work<'_> {
 
     /// Moves every vertex to where the faces round it are worth most. Returns how many moved.
     pub(super) fn improve(&mut self) -> usize {
-        let mut moved = 0;
-        for v in self.awake_vertices() {
-            let gained = match self.mesh.vertex_freedom(v) {
-                Freedom::Free if !self.mesh.is_boundary_vertex(v) => self.improve_free(v),
-                Freedom::OnCurve => self.improve_on_curve(v),
-                Freedom::Free | Freedom::Keep => false,
-            };
-            moved += usize::from(gained);
-        }
-        moved
+        self.move_in_turn(Self::better_place, Self::better_place_on_curve)
     }
 
     fn sides_round(&self, v: VertexId) -> Sides {
@@ -158,38 +195,42 @@ impl Work<'_> {
         self.mesh.outgoing(v).filter(|&h| self.mesh.face(h).is_some()).map(side).collect()
     }
 
-    fn improve_free(&mut self, v: VertexId) -> bool {
+    fn better_place(&self, v: VertexId) -> Option<Place> {
         let (at, sides) = (self.point(v), self.sides_round(v));
         let before = worth_at(at, &sides);
         if before > WELL * sides.len() as f64 {
-            return false;
+            return None;
         }
-        let Some(normal) = self.normal_at(v).try_normalize() else { return false };
+        let normal = self.normal_at(v).try_normalize()?;
         let shortest = sides.iter().map(|side| side[0].distance(at)).fold(f64::INFINITY, f64::min);
         let across = normal.any_orthonormal_vector();
         let along = normal.cross(across);
         let places = |step: f64| COMPASS.map(|(cos, sin)| step * shortest * (cos * across + sin * along));
         let (best, reached) = climb(at, before, &sides, places);
         if reached <= before + LITTLE {
-            return false;
+            return None;
         }
         let foot = self.project(best, v);
-        self.reference.normal(foot.face).dot(normal) > SAME_SIDE
+        let gains = self.reference.normal(foot.face).dot(normal) > SAME_SIDE
             && worth_at(foot.point, &sides) > before + LITTLE
-            && self.move_to(v, foot.point, foot.face, 0.0)
+            && self.may_go(v, foot.point, 0.0);
+        gains.then_some(Place { at: foot.point, foot: foot.face })
     }
 
-    fn improve_on_curve(&mut self, v: VertexId) -> bool {
-        let Some(ends) = self.curve_neighbours(v) else { return false };
+    fn better_place_on_curve(&self, v: VertexId) -> Option<Place> {
+        let ends = self.curve_neighbours(v)?;
         let (at, sides) = (self.point(v), self.sides_round(v));
         let before = worth_at(at, &sides);
         let ways = ends.map(|w| self.point(w) - at);
         let (best, reached) = climb(at, before, &sides, |step| ways.map(|way| step * way));
         if reached <= before + LITTLE {
-            return false;
+            return None;
         }
-        let Some(to) = self.reference.curves.project(best) else { return false };
-        worth_at(to, &sides) > before + LITTLE && self.slide_to(v, to, 0.0)
+        let to = self.reference.curves.project(best)?;
+        if worth_at(to, &sides) <= before + LITTLE {
+            return None;
+        }
+        self.place_on_curve(v, to, 0.0)
     }
 }
 

@@ -47,7 +47,7 @@ impl Work<'_> {
     }
 
     /// Halves an edge. Its new vertex lies on the curve or on the surface where that does not spoil the faces.
-    fn split_edge(&mut self, e: EdgeId) -> Option<VertexId> {
+    pub(super) fn split_edge(&mut self, e: EdgeId) -> Option<VertexId> {
         let plan = check_split(&self.mesh, e).ok()?;
         let [p, q] = plan.ends.map(|v| self.point(v));
         let middle = 0.5 * (p + q);

@@ -3,8 +3,8 @@
 use glam::DVec3;
 use smallvec::SmallVec;
 
+use super::Rules;
 use super::reference::{Foot, Reference};
-use super::{Attempt, Rules};
 use crate::mesh::geometry::{angle, area_vector, centroid};
 use crate::mesh::halfedge::{HalfedgeMesh, edge_of};
 use crate::mesh::{EdgeId, FaceId, Freedom, VertexId};
@@ -66,13 +66,12 @@ pub(super) struct Work<'a> {
     /// Vertices that hold a place of the reference that would be lost else.
     pub(super) pinned: Vec<bool>,
     pub(super) care: Care,
-    pub(super) attempt: Attempt,
     pub(super) tally: Counts,
 }
 
 impl<'a> Work<'a> {
     /// Begins with `mesh`, which was made of the reference.
-    pub(super) fn new(mesh: HalfedgeMesh, reference: &'a Reference<'a>, rules: &'a Rules, attempt: Attempt) -> Self {
+    pub(super) fn new(mesh: HalfedgeMesh, reference: &'a Reference<'a>, rules: &'a Rules, gradation: f64) -> Self {
         let slots = mesh.vertex_slots();
         let mut feet: Vec<Option<FaceId>> = vec![None; slots];
         for f in mesh.faces() {
@@ -81,14 +80,13 @@ impl<'a> Work<'a> {
                 *known = known.filter(|&k| reference.longest[k] <= reference.longest[f]).or(Some(f));
             }
         }
-        let bounds = Bounds { most: rules.size.most(), least: rules.least_size, gradation: attempt.gradation };
+        let bounds = Bounds { most: rules.size.most(), least: rules.least_size, gradation };
         Self {
             sizing: Sizing::new(bounds, slots),
             feet: feet.into_iter().map(|f| f.unwrap_or(FaceId::new(0))).collect(),
             awake: vec![true; slots],
             pinned: vec![false; slots],
             care: Care::Sizes,
-            attempt,
             tally: Counts::default(),
             mesh,
             reference,
@@ -221,6 +219,18 @@ impl<'a> Work<'a> {
         for w in self.mesh.neighbours(v) {
             self.awake[w.index()] = true;
         }
+    }
+
+    /// Most edges that a vertex may have; what the other copies of one on a seam have counts.
+    pub(super) fn most_edges(&self, v: VertexId) -> usize {
+        self.rules.max_valence.saturating_sub(self.mesh.valence_elsewhere(v))
+    }
+
+    /// Lets sizes grow so much over a unit of length from here on, everywhere.
+    pub(super) fn begin(&mut self, gradation: f64) {
+        self.sizing.grow_by(gradation);
+        self.set_sizes();
+        self.awake.fill(true);
     }
 
     /// Sets all sizes anew.

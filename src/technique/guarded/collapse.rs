@@ -75,8 +75,8 @@ impl GuardedMesh<'_> {
     /// The first reason against any collapse of the edge.
     pub fn plan_collapse(&mut self, edge: EdgeId, rules: &StarRules) -> Result<Collapse, Refused> {
         let plan = check_collapse(&self.mesh, edge)?;
-        let (tallest, valence) = self.star.walk(&self.mesh, &plan);
-        if valence > self.limits.max_valence.max(tallest) || self.star.is_empty() {
+        let valence = self.star.walk(&self.mesh, &plan);
+        if valence > self.most_edges_of_merged(&[plan.removed, plan.kept]) || self.star.is_empty() {
             return Err(Refused::Valence);
         }
         let ends = [self.mesh.point(plan.removed), self.mesh.point(plan.kept)];

@@ -62,14 +62,14 @@ impl GuardedMesh<'_> {
         if ends.iter().any(|&v| valence(v) <= least(v)) {
             return false;
         }
-        let most = self.limits.max_valence as i64;
+        let most = |v: VertexId| self.most_edges(v) as i64;
         let tallest = ends.map(valence).into_iter().max().unwrap_or(0);
         let is_worth_it = match gain {
             Gain::Mend(_) | Gain::LeastStretch | Gain::LeastAngle => true,
             Gain::Quality | Gain::Mean(_) | Gain::Keep(_) | Gain::None => false,
         };
-        is_worth_it && apexes.iter().all(|&v| valence(v) < most.max(tallest))
-            || apexes.iter().all(|&v| valence(v) < most)
+        let may_be_taller = |v: VertexId| is_worth_it && self.mesh.seam(v).is_none() && valence(v) < tallest;
+        apexes.iter().all(|&v| valence(v) < most(v) || may_be_taller(v))
     }
 
     /// Whether two faces lie in one plane, by far nearer than the tolerance: then a flip that does not fold leaves the

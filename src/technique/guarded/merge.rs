@@ -62,8 +62,7 @@ impl GuardedMesh<'_> {
     pub fn plan_edge(&mut self, edge: EdgeId, rules: &StarRules) -> Result<Merge, Refused> {
         let plan = check_collapse(&self.mesh, edge)?;
         let mesh = &self.mesh;
-        let allowed = self.limits.max_valence.max(mesh.valence(plan.removed)).max(mesh.valence(plan.kept));
-        if plan.new_valence(mesh) > allowed {
+        if plan.new_valence(mesh) > self.most_edges_of_merged(&[plan.removed, plan.kept]) {
             return Err(Refused::Valence);
         }
         let removed = plan.removed_faces(mesh).into_iter().flatten().collect::<SmallVec<[FaceId; 4]>>();
@@ -77,9 +76,7 @@ impl GuardedMesh<'_> {
     /// The first reason against it wherever the merged vertex lies.
     pub fn plan_face(&mut self, face: FaceId, rules: &StarRules) -> Result<Merge, Refused> {
         let plan = check_merge_face(&self.mesh, face)?;
-        let valences = plan.corners.map(|v| self.mesh.valence(v));
-        let allowed = valences.into_iter().fold(self.limits.max_valence, usize::max);
-        if plan.new_valence(&self.mesh) > allowed {
+        if plan.new_valence(&self.mesh) > self.most_edges_of_merged(&plan.corners) {
             return Err(Refused::Valence);
         }
         let removed = plan.removed_faces(&self.mesh);

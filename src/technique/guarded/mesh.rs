@@ -222,6 +222,20 @@ impl GuardedMesh<'_> {
         ends.next().is_none().then_some(pair)
     }
 
+    /// Most edges that a vertex may have; what the other copies of one on a seam have counts.
+    pub(super) fn most_edges(&self, v: VertexId) -> usize {
+        self.limits.max_valence.saturating_sub(self.mesh.valence_elsewhere(v))
+    }
+
+    /// The same of the vertex that some become: no fewer than one of them has, though on a seam no more than that one.
+    pub(super) fn most_edges_of_merged(&self, vertices: &[VertexId]) -> usize {
+        let on_seam = vertices.iter().copied().find(|&v| self.mesh.seam(v).is_some());
+        if let Some(v) = on_seam {
+            return self.most_edges(v).max(self.mesh.valence(v));
+        }
+        vertices.iter().map(|&v| self.mesh.valence(v)).fold(self.limits.max_valence, usize::max)
+    }
+
     fn remember_shape(&mut self, f: FaceId, corners: [DVec3; 3]) {
         if f.index() >= self.shapes.len() {
             self.shapes.resize(f.index() + 1, Shape::default());

@@ -49,7 +49,7 @@ impl GuardedMesh<'_> {
             let h = halfedge_of(plan.edge);
             for side in [h, twin(h)] {
                 let (Some(face), Some(apex)) = (self.mesh.face(side), self.mesh.apex(side)) else { continue };
-                if self.mesh.valence(apex) >= self.limits.max_valence {
+                if self.mesh.valence(apex) >= self.most_edges(apex) {
                     return Err(Refused::Valence);
                 }
                 if self.patch.old.contains(&face) {

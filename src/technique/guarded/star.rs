@@ -72,8 +72,8 @@ pub(super) struct Star {
 }
 
 impl Star {
-    /// Walks round both ends. Returns the larger of the valences now, and the valence of the merged vertex.
-    pub(super) fn walk(&mut self, mesh: &HalfedgeMesh, plan: &CollapsePlan) -> (usize, usize) {
+    /// Walks round both ends. Returns the valence of the merged vertex.
+    pub(super) fn walk(&mut self, mesh: &HalfedgeMesh, plan: &CollapsePlan) -> usize {
         self.age += 1;
         self.ring.clear();
         self.survivors.clear();
@@ -81,16 +81,16 @@ impl Star {
         let [left, right] = [mesh.face(h), mesh.face(t)];
         self.gone = [left, right];
         self.gone_has_normal = [false; 2];
-        let of_removed = self.walk_end(mesh, h, right, None, None);
+        self.walk_end(mesh, h, right, None, None);
         self.of_removed = self.survivors.len();
         let last = self.ring.len().wrapping_sub(1) as u32;
         let shared = [left.map(|_| last), right.map(|_| 0)];
-        let of_kept = self.walk_end(mesh, t, left, shared[0], shared[1]);
-        (of_removed.max(of_kept), self.ring.len())
+        self.walk_end(mesh, t, left, shared[0], shared[1]);
+        self.ring.len()
     }
 
     /// Walks round the origin of `from`, without `from` itself. `first` and `last` are the places on the ring that the
-    /// first and the last neighbour have already. Returns the valence.
+    /// first and the last neighbour have already.
     fn walk_end(
         &mut self,
         mesh: &HalfedgeMesh,
@@ -98,14 +98,12 @@ impl Star {
         skip: Option<FaceId>,
         first: Option<u32>,
         last: Option<u32>,
-    ) -> usize {
-        let mut valence = 1;
+    ) {
         let mut out = mesh.next(twin(from));
         let mut previous = 0;
         let mut known = first;
         while out != from {
             let following = mesh.next(twin(out));
-            valence += 1;
             if following == from && last.is_some() {
                 known = last;
             }
@@ -128,7 +126,6 @@ impl Star {
             previous = at;
             out = following;
         }
-        valence
     }
 
     /// Measures what was walked over. `ends` are the positions of the vanishing and of the kept vertex.
@@ -257,7 +254,7 @@ mod tests {
         let plans: Vec<CollapsePlan> = mesh.edges().filter_map(|e| check_collapse(&mesh, e).ok()).collect();
         assert!(plans.len() > 30);
         for plan in plans {
-            let (_, valence) = star.walk(&mesh, &plan);
+            let valence = star.walk(&mesh, &plan);
             assert_eq!(valence, plan.new_valence(&mesh));
             let ends = [plan.removed, plan.kept].map(|v| mesh.point(v));
             star.measure(&mesh, &shapes, ends, 0.0);

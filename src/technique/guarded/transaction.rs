@@ -156,12 +156,14 @@ impl Trial<'_> {
     }
 
     /// No vertex has more edges than allowed, or than it had.
-    fn keeps_valence(&self, most: usize) -> bool {
+    fn keeps_valence(&self, guarded: &GuardedMesh<'_>) -> bool {
         let Copied { mesh, vertices, .. } = &self.draft.copied;
-        let had = |v: VertexId| if v.index() < vertices.len() { mesh.valence(v) } else { 0 };
         self.mesh.vertices().all(|v| {
             let now = self.mesh.valence(v);
-            now <= most || now <= had(v)
+            match vertices.get(v.index()) {
+                Some(&original) => now <= guarded.most_edges(original) || now <= mesh.valence(v),
+                None => now <= guarded.limits.max_valence,
+            }
         })
     }
 
@@ -209,7 +211,7 @@ impl GuardedMesh<'_> {
         }
         let before = self.tally(&self.patch.old, gain);
         self.gains(&before, gain)?;
-        if !trial.keeps_valence(self.limits.max_valence) {
+        if !trial.keeps_valence(self) {
             return Err(Refused::Valence);
         }
         if !trial.keeps_curves(&self.keeper) {

@@ -52,6 +52,11 @@ impl Sizing {
         self.bounds
     }
 
+    /// From the next [`Sizing::set`] on, sizes grow so much over a unit of length.
+    pub fn grow_by(&mut self, gradation: f64) {
+        self.bounds.gradation = gradation;
+    }
+
     /// The size at a vertex.
     #[inline]
     pub fn at(&self, v: VertexId) -> f64 {
