@@ -68,6 +68,7 @@ pub(super) fn morph(
         }
         best.stats.attempts = attempts;
     }
+    let is_hopeless = best.is_hopeless();
     if best.stats.reworked > 0 {
         work.tidy(&mut best, rules)?;
     }
@@ -75,7 +76,7 @@ pub(super) fn morph(
     let Attempt { quads, mut stats, .. } = best;
     stats.distance = check.distance(&quads, watch)?;
     stats.triangles = quads.census().0;
-    stats.work_limit_reached = work.is_spent();
+    stats.work_limit_reached = work.is_spent() || is_hopeless;
     Ok((quads, stats))
 }
 
@@ -114,20 +115,21 @@ impl Morpher<'_, '_> {
         let (ground, watch, most) = (self.ground, self.watch, self.params.attempts.max(1));
         let mut mesh = self.triangles(&[], rules)?;
         prepare(&mut mesh, ground, self.check, rules, watch)?;
+        are_few_enough(&mesh, rules)?;
         let signs = signs(&mesh, ground.region_count());
         if begun.contains(&signs) {
             return Ok(None);
         }
         begun.push(signs);
         let mut first = self.attempt(mesh, None, rules, stats)?.ok_or(QMorphError::Empty)?;
-        if most == 1 || first.is_good() {
+        if most == 1 || first.is_good() || first.is_hopeless() {
             return Ok(Some(first));
         }
         let mut few = self.reworked(first.clone(), rules)?;
         if !few.flaws.crossing.is_empty()
             && self.left.get() > 0
             && !self.is_spent()
-            && let Some(other) = self.begin_untangled(rules, stats)?
+            && let Some(other) = self.begin_untangled(rules, stats, begun)?
         {
             let reworked = self.reworked(other.clone(), rules)?;
             if reworked.is_better_than(&few) {
@@ -150,11 +152,19 @@ impl Morpher<'_, '_> {
         Ok(Some(best))
     }
 
-    /// An attempt from triangles that do not fold up.
-    fn begin_untangled(&self, rules: Rules, stats: &QMorphStats) -> Result<Option<Attempt>, QMorphError> {
+    /// An attempt from triangles that do not fold up; `None` where they are those that all `begun` with.
+    fn begin_untangled(
+        &self,
+        rules: Rules,
+        stats: &QMorphStats,
+        begun: &[Vec<u64>],
+    ) -> Result<Option<Attempt>, QMorphError> {
         let (ground, check, watch) = (self.ground, self.check, self.watch);
         let mut mesh = untangled(ground, check, rules, watch, &|places| self.triangles(places, rules))?;
         prepare(&mut mesh, ground, check, rules, watch)?;
+        if begun.contains(&signs(&mesh, ground.region_count())) {
+            return Ok(None);
+        }
         Ok(self.attempt(mesh, None, rules, stats)?)
     }
 
@@ -166,10 +176,7 @@ impl Morpher<'_, '_> {
         sizes::set(&mut mesh, ground.surface, self.params, self.scale).map_err(QMorphError::Size)?;
         lower_sizes(&mut mesh, places, rules.floor);
         remesh(&mut mesh, ground, rules, watch)?;
-        if mesh.faces().count() > rules.most_faces {
-            let wanted = rules.most_faces.saturating_sub(budget::FEW) as f64 / budget::LOWERED;
-            return Err(QMorphError::LoweredSizes { most: rules.most_faces, wanted });
-        }
+        are_few_enough(&mesh, rules)?;
         Ok(mesh)
     }
 
@@ -327,6 +334,15 @@ impl Morpher<'_, '_> {
         self.settle(&mut attempt, rules)?;
         Ok(Some(attempt))
     }
+}
+
+/// Stops before the work where curves, narrow strips and distances ask for far more triangles than the size does.
+fn are_few_enough(mesh: &Mixed, rules: Rules) -> Result<(), QMorphError> {
+    if mesh.faces().count() <= rules.most_faces {
+        return Ok(());
+    }
+    let wanted = rules.most_faces.saturating_sub(budget::FEW) as f64 / budget::LOWERED;
+    Err(QMorphError::LoweredSizes { most: rules.most_faces, wanted })
 }
 
 /// Lowers sizes where the triangles are too far from the surface: what they miss, quads miss more.

@@ -12,9 +12,19 @@ const ALWAYS: u64 = 250_000;
 const TIMES: u64 = 4;
 
 /// Triangles that any part may have at first.
-pub(super) const FEW: usize = 100_000;
+pub(super) const FEW: usize = 40_000;
 /// How many times the faces that the size asks for curves and narrow strips may make of them.
-pub(super) const LOWERED: f64 = 20.0;
+pub(super) const LOWERED: f64 = 12.0;
+
+/// What quads may lack for one of them, and of how many more that counts: beyond it so many are broken that no more
+/// work mends them.
+const HOPELESS: f64 = 0.05;
+const BESIDE: f64 = 10_000.0;
+
+/// Whether so many quads that lack so much together are beyond all mending.
+pub(super) fn is_hopeless(lack: f64, faces: usize) -> bool {
+    lack > HOPELESS * (BESIDE + faces as f64)
+}
 
 /// How many triangles there may be at first, where the size asks for so many faces.
 pub(super) fn most_triangles(wanted: f64) -> usize {
@@ -53,6 +63,14 @@ impl Budget {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn some_broken_quads_are_mended_and_hundreds_are_not() {
+        assert!(!is_hopeless(10.0, 1), "one broken quad");
+        assert!(!is_hopeless(300.0, 1_000));
+        assert!(is_hopeless(2_300.0, 4_000));
+        assert!(!is_hopeless(2_300.0, 100_000));
+    }
 
     #[test]
     fn large_parts_may_be_made_four_times_over() {

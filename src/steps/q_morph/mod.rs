@@ -30,7 +30,8 @@
 //!
 //! # Cost
 //! Linear in the faces of input and result, times a logarithm for the way back onto the surface. How often faces are
-//! made anew has a limit that is a function of their number (`budget`).
+//! made anew has a limit that is a function of their number (`budget`), and nothing is made anew where hundreds of quads
+//! are broken at first.
 //!
 //! # Departures
 //! The papers take the triangles as they come and keep their border edges; sampling and remeshing first is what makes
@@ -170,8 +171,9 @@ pub struct QMorphStats {
     pub regular_share: f64,
     /// How often the front was run: once, and again where distance or shapes were not good enough.
     pub attempts: usize,
-    /// Whether the work that a part of this size may cost was done before distance and shapes were good everywhere: the
-    /// result is then the best that was reached. Larger sizes or tolerances leave less to do.
+    /// Whether the work that a part of this size may cost was done before distance and shapes were good everywhere, or
+    /// hundreds of quads were broken at first, so that no work would mend them: the result is then the best that was
+    /// reached. Larger sizes or tolerances leave less to do.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub work_limit_reached: bool,
     /// The largest distance between quads and surface, certified both ways. Larger than `tolerance` where sizes must
@@ -351,7 +353,7 @@ pub struct Step;
 
 impl StepContract for Step {
     const NAME: &'static str = "q-morph";
-    const REVISION: u32 = 19;
+    const REVISION: u32 = 20;
     const INPUTS: &'static [InputDef] = &[InputDef {
         name: "from",
         accepts: &[Port::Surface],

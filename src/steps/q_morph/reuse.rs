@@ -6,6 +6,7 @@ use glam::DVec3;
 use rustc_hash::{FxHashMap, FxHasher};
 
 use super::QMorphStats;
+use super::budget::is_hopeless;
 use super::check::Flaws;
 use super::lack::{FAIR, shortfall};
 use crate::mesh::{Facet, Soup, VertexId, edge_key};
@@ -45,6 +46,11 @@ impl Attempt {
     /// Whether nothing is left but poor shapes, which lack less together than one flat face.
     pub(super) fn is_fair(&self) -> bool {
         self.flaws.faults.is_empty() && self.flaws.crossing.is_empty() && self.lack < FAIR
+    }
+
+    /// Whether so much is broken that no more work would mend it.
+    pub(super) fn is_hopeless(&self) -> bool {
+        is_hopeless(self.lack, self.quads.faces().count())
     }
 
     /// This one or a better one, which counts the attempts of both.

@@ -299,10 +299,16 @@ impl Mixed {
 
     /// Whether the star of `v` is one of a proper mesh: distinct neighbours and, inside, at least `least` of them.
     pub fn is_proper(&self, v: u32, least: usize) -> bool {
-        let ring: smallvec::SmallVec<[u32; 16]> = self.neighbours(v).collect();
+        /// Rings longer than this are sorted to find a vertex twice.
+        const LONG: usize = 32;
+        let mut ring: smallvec::SmallVec<[u32; 16]> = self.neighbours(v).collect();
         let border = self.star(v).any(|h| self.face(h) == NONE);
         if ring.len() < if border { 2 } else { least } {
             return false;
+        }
+        if ring.len() > LONG {
+            ring.sort_unstable();
+            return !ring.contains(&v) && ring.windows(2).all(|pair| pair[0] != pair[1]);
         }
         ring.iter().enumerate().all(|(i, a)| *a != v && !ring[..i].contains(a))
     }

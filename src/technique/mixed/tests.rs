@@ -83,3 +83,24 @@ fn a_star_can_be_drawn_into_a_neighbour() {
     mesh.compact();
     assert_eq!(mesh.faults(), [] as [String; 0]);
 }
+
+/// A fan of so many triangles about vertex 0, whose rim vertices have these numbers.
+fn fan(rim: &[u32]) -> Option<Mixed> {
+    let turn = std::f64::consts::TAU / rim.len() as f64;
+    let on_rim = |i: usize| dvec3(libm::cos(turn * i as f64), libm::sin(turn * i as f64), 0.0);
+    let points: Vec<DVec3> = std::iter::once(DVec3::ZERO).chain((0..rim.len()).map(on_rim)).collect();
+    let faces: Vec<[u32; 3]> = (0..rim.len()).map(|i| [0, rim[i], rim[(i + 1) % rim.len()]]).collect();
+    let faces: Vec<&[u32]> = faces.iter().map(|f| &f[..]).collect();
+    Mixed::of_faces(&points, &faces)
+}
+
+#[test]
+fn a_star_is_proper_where_no_vertex_is_in_it_twice_however_many_there_are() {
+    for count in [5, 31, 33, 200] {
+        let mut rim: Vec<u32> = (1..=count).collect();
+        let mesh = fan(&rim).unwrap();
+        assert!(mesh.is_proper(0, 3) && mesh.is_proper(0, count as usize) && !mesh.is_proper(0, count as usize + 1));
+        rim[count as usize - 2] = 2;
+        assert!(fan(&rim).is_none(), "{count}: vertex 2 is in the star twice");
+    }
+}
