@@ -99,7 +99,7 @@ fn corners_under(ground: &Ground<'_>, point: DVec3, place: Place) -> SmallVec<[V
 
 #[cfg(test)]
 mod tests {
-    use super::super::rework::tests::{N, id, quads, square};
+    use super::super::testing::{N, id, quads, square};
     use super::*;
 
     #[test]

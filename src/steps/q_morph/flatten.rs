@@ -164,7 +164,7 @@ fn wishes(mesh: &Mixed, v: u32) -> impl Iterator<Item = DVec3> + use<> {
 mod tests {
     use glam::dvec3;
 
-    use super::super::rework::tests::{id, quads, rules, square};
+    use super::super::testing::{id, quads, rules, square};
     use super::*;
 
     const TOLERANCE: f64 = 0.3;

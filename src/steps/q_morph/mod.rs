@@ -30,8 +30,8 @@
 //!
 //! # Cost
 //! Linear in the faces of input and result, times a logarithm for the way back onto the surface. How often faces are
-//! made anew has a limit that is a function of their number (`budget`), and nothing is made anew where hundreds of quads
-//! are broken at first.
+//! made anew has a limit that is a function of their number (`budget`), and nothing is made anew where hundreds of
+//! quads are broken at first.
 //!
 //! # Departures
 //! The papers take the triangles as they come and keep their border edges; sampling and remeshing first is what makes
@@ -51,6 +51,8 @@ mod rework;
 mod search;
 mod settle;
 mod sizes;
+#[cfg(test)]
+mod testing;
 mod untangle;
 
 use std::sync::Arc;

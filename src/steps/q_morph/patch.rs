@@ -313,7 +313,7 @@ fn cut(mesh: &Mixed, corners: &Corners) -> Vec<[u32; 3]> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::rework::tests::{N, id, quads, rules, square};
+    use super::super::testing::{N, id, quads, rules, square};
     use super::*;
     use crate::mesh::carried::{EdgeMark, MarkCause};
     use crate::mesh::{Freedom, Surface, edge_key};
