@@ -11,7 +11,8 @@
 //! slowly along the mesh; where it is above, further collapses use it up. What is left of poor faces is mended in a
 //! guarded mesh ([`super::guarded`]), which also certifies the result.
 //!
-//! Where no certificate is reached, all is done again with other sizes, and then in the guarded mesh from the beginning.
+//! Where no certificate is reached, all is done again with other sizes, and then in the guarded mesh from the
+//! beginning.
 //!
 //! Passes decide on edits on all threads, and do them in one order: the result is the same for any number.
 //!

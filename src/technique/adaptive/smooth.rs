@@ -63,8 +63,8 @@ impl Work<'_> {
         self.move_in_turn(Self::centred, Self::evened);
     }
 
-    /// Puts vertices that lie off the reference back on it, at the cost of shapes: halves of edges that cut a corner stay
-    /// behind where faces would have turned.
+    /// Puts vertices that lie off the reference back on it, at the cost of shapes: halves of edges that cut a corner
+    /// stay behind where faces would have turned.
     pub(super) fn settle(&mut self) {
         let squared = (OFF * self.rules.tolerance).powi(2);
         let look = |work: &Self, v: VertexId| {
