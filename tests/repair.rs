@@ -1,5 +1,10 @@
 //! Repair on small meshes with one defect each: exact counts, and the promises of the step.
 
+#[path = "repair/refused.rs"]
+mod refused;
+#[path = "repair/solid.rs"]
+mod solid;
+
 use glam::DVec3;
 use meshmill::mesh::{Facet, Soup, Surface, VertexId};
 use meshmill::steps::repair::{RepairError, RepairParams, RepairStats, repair};

@@ -73,7 +73,7 @@ fn how_far_bodies_run_through_each_other_does_not_depend_on_how_finely_they_are_
 /// Four similar triangles for each.
 fn quartered(soup: &Soup) -> Soup {
     let mut points: Vec<[f64; 3]> = Vec::new();
-    for facet in soup.faces.iter() {
+    for facet in &soup.faces {
         let corners: Vec<DVec3> = facet.corners().iter().map(|&v| soup.points[v]).collect();
         for at in 1..corners.len() - 1 {
             let [a, b, c] = [corners[0], corners[at], corners[at + 1]];

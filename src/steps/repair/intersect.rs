@@ -25,7 +25,8 @@ pub(super) struct Intersections {
     pub(super) faces: Vec<u32>,
     /// Whether these are all pairs; else there are at least as many.
     pub(super) complete: bool,
-    met: Vec<(u32, u32, Meeting)>,
+    /// The pairs and how they meet.
+    pub(super) met: Vec<(u32, u32, Meeting)>,
 }
 
 impl Intersections {

@@ -6,13 +6,14 @@
 //! and each vertex gets one copy for each fan of faces, which makes the mesh a manifold by construction. Neighbours
 //! are turned until they agree (a Möbius strip is cut), closed components until they look outward, and those that
 //! bound a cavity inward. Wanted holes are filled with the least bend, refined and faired like their surroundings.
+//! Faces that run through each other are cut where they meet, if wanted, and what is inside of bodies goes.
 //!
 //! Based on: Guéziec, Taubin, Lazarus, Horn. Cutting and stitching: converting sets of polygons to manifold surfaces.
 //! IEEE Transactions on Visualization and Computer Graphics 7(2), 2001.
 //!
 //! # Invariants
 //! - The result is an oriented 2-manifold, with a border where the input has one that was not filled.
-//! - Outside filled holes the surface moves no further than `max-move`.
+//! - Outside filled holes and what is inside of bodies the surface moves no further than `max-move`.
 //! - Idempotent: repairing the result changes nothing, unless `rounds` says that it was given up after eight.
 //! - Groups, regions, marks and fields follow their elements.
 //! - Closed manifold input keeps its topology: nothing but open edges is welded within a tolerance.
@@ -43,11 +44,12 @@ mod outward;
 mod params;
 mod patch;
 mod report;
+mod solid;
 mod tjunction;
 mod weld;
 
-pub use params::{FillHoles, KeepComponents, NonManifold, RepairParams, SelfIntersections};
-pub use report::{ComponentStats, LoopFate, LoopStats, RepairError, RepairStats};
+pub use params::{Bodies, FillHoles, KeepComponents, NonManifold, RepairParams, SelfIntersections};
+pub use report::{ComponentStats, LoopFate, LoopStats, RemovalStats, RepairError, RepairStats};
 
 use glam::DVec3;
 
@@ -64,12 +66,49 @@ use crate::watch::Watch;
 /// # Errors
 /// [`RepairError`]: nothing to repair, nothing left of it, or a corner that is not there.
 pub fn repair(soup: &Soup, params: &RepairParams, watch: &Watch) -> Result<(Surface, RepairStats), RepairError> {
+    let (surface, _, stats) = repair_and_remove(soup, params, watch)?;
+    Ok((surface, stats))
+}
+
+/// Repairs `soup`; returns also the pieces that were inside of bodies.
+///
+/// # Errors
+/// As [`repair`].
+pub fn repair_and_remove(
+    soup: &Soup,
+    params: &RepairParams,
+    watch: &Watch,
+) -> Result<(Surface, Soup, RepairStats), RepairError> {
     let diagonal = check_input(soup)?;
     check_arithmetic(soup, diagonal)?;
     let limit = params.max_move.unwrap_or(params.weld).resolve(diagonal);
     let tolerance = params.weld.resolve(diagonal).min(limit);
+    let (mut surface, mut stats) = settle(soup, params, tolerance, limit, watch)?;
+    watch.check()?;
+    if stats.degenerate_faces_left as usize == surface.faces.len() {
+        return Err(RepairError::NoArea { faces: surface.faces.len() });
+    }
+    let (mut pieces, mut left) = (Soup::default(), None);
+    if params.self_intersections == SelfIntersections::Remove {
+        let again = |soup: &Soup, rest: f64| settle(soup, params, tolerance.min(rest), rest, watch);
+        let removed = solid::remove_intersections(surface, params, limit, &mut stats, watch, again)?;
+        (surface, pieces, left) = (removed.surface, removed.pieces, Some(removed.left));
+    }
+    let longest = params.crossing_length.map(|length| (length.resolve(diagonal), diagonal));
+    count_intersections(&surface, soup, left, longest, &mut stats, watch)?;
+    stats.warnings = stats.taken_away().into_iter().chain(near::beside_each_other(&surface)).collect();
+    Ok((surface, pieces, stats))
+}
+
+/// All passes, again until nothing changes: what a cut or a dropped face uncovers may need repair as well.
+fn settle(
+    soup: &Soup,
+    params: &RepairParams,
+    tolerance: f64,
+    limit: f64,
+    watch: &Watch,
+) -> Result<(Surface, RepairStats), RepairError> {
     let (mut surface, mut stats) = repair_once(soup, params, tolerance, limit, watch)?;
-    // What a cut or a dropped face uncovers may need repair as well: go on until nothing changes.
     let cut = stats.vertex_copies + stats.repeated_faces + stats.cancelled_faces + stats.slivers_dropped;
     let mut unsettled = cut + stats.t_junctions > 0;
     while unsettled && stats.rounds < ROUNDS {
@@ -79,13 +118,6 @@ pub fn repair(soup: &Soup, params: &RepairParams, watch: &Watch) -> Result<(Surf
         stats.go_on(more);
         surface = again;
     }
-    watch.check()?;
-    if stats.degenerate_faces_left as usize == surface.faces.len() {
-        return Err(RepairError::NoArea { faces: surface.faces.len() });
-    }
-    let longest = params.crossing_length.map(|length| (length.resolve(diagonal), diagonal));
-    count_intersections(&surface, soup, longest, &mut stats, watch)?;
-    stats.warnings = stats.taken_away().into_iter().chain(near::beside_each_other(&surface)).collect();
     Ok((surface, stats))
 }
 
@@ -298,17 +330,19 @@ fn check_result(draft: &Draft, stats: &RepairStats, limit: f64) -> Result<(), Re
 fn count_intersections(
     surface: &Surface,
     soup: &Soup,
+    known: Option<intersect::Intersections>,
     longest: Option<(f64, f64)>,
     stats: &mut RepairStats,
     watch: &Watch,
 ) -> Result<(), RepairError> {
-    let after = intersect::self_intersections(surface.faces.len(), |f| surface.corners(f), watch)?;
+    let count = || intersect::self_intersections(surface.faces.len(), |f| surface.corners(f), watch);
+    let after = known.map_or_else(count, Ok)?;
     if let Some(longest) = longest {
         after.check_length(longest, |f| surface.corners(f))?;
     }
     let changes = stats.vertices_welded + stats.t_junctions + stats.edges_collapsed + stats.edges_flipped;
     let dropped = stats.repeated_faces + stats.cancelled_faces + stats.slivers_dropped + stats.components_dropped;
-    let added = stats.faces_filled + stats.double_edges_split;
+    let added = stats.faces_filled + stats.double_edges_split + stats.removal.as_ref().map_or(0, |all| all.rounds);
     let before = if changes + dropped + added == 0 {
         None
     } else {
@@ -336,7 +370,10 @@ impl crate::step::Step for Step {
         required: true,
         doc: "the mesh to repair, as read",
     }];
-    const OUTPUTS: &'static [OutputDef] = &[OutputDef { name: "main", port: OutPort::Is(Port::Surface), derive: None }];
+    const OUTPUTS: &'static [OutputDef] = &[
+        OutputDef { name: "main", port: OutPort::Is(Port::Surface), derive: None },
+        OutputDef { name: "removed", port: OutPort::Is(Port::Soup), derive: None },
+    ];
     const CARRIES: &'static str = "groups, regions, marks and fields follow their elements; faces that fill holes are \
         in the face group `filled`, and take region and values from the rim; seams are made anew";
     const EXAMPLE: &'static str = "use = \"repair\"\nfrom = \"raw\"\nfill-holes = \"all\"\n";
@@ -346,14 +383,18 @@ impl crate::step::Step for Step {
 
     fn run(
         inputs: &Inputs,
-        _output: &str,
+        output: &str,
         params: &RepairParams,
         _locks: &Locks,
         watch: &Watch,
     ) -> Result<Produced<RepairStats>, StepFailure> {
         let soup = inputs.require("from")?.to_soup();
         let soup = soup.ok_or_else(|| StepFailure::bad_input("expected a soup or a surface"))?;
-        let (surface, stats) = repair(&soup, params, watch)?;
-        Ok(Produced { artifact: Artifact::Surface(std::sync::Arc::new(surface)), stats })
+        let (surface, removed, stats) = repair_and_remove(&soup, params, watch)?;
+        let artifact = match output {
+            "removed" => Artifact::Soup(std::sync::Arc::new(removed)),
+            _ => Artifact::Surface(std::sync::Arc::new(surface)),
+        };
+        Ok(Produced { artifact, stats })
     }
 }

@@ -26,8 +26,13 @@ pub struct RepairParams {
     /// What becomes of edges with more than two faces: `"cut"` (default) takes the sheets apart, `"seam"` also
     /// remembers that they belong together, so that later steps treat them alike and the written mesh is joined again.
     pub non_manifold: NonManifold,
-    /// What becomes of faces that run through each other: `"report"` (default) counts them.
+    /// What becomes of faces that run through each other: `"report"` (default) counts them; `"remove"` cuts them along
+    /// where they meet and drops what is inside of bodies, so that no two faces meet any more. Sheets are cut and stay.
+    /// Faces that meet none keep their coordinates.
     pub self_intersections: SelfIntersections,
+    /// With `"remove"`, what becomes of bodies that run through or touch each other: `"keep"` (default) removes only
+    /// what runs through itself, `"union"` makes them one. Bodies inside of others that they do not touch stay.
+    pub bodies: Bodies,
     /// Along how much, in all, faces of the result may run through each other; faces that lie on each other count with
     /// the area that they share over the diagonal. Where it is more, no finer mesh keeps to the same crossings: repair
     /// then fails and says where, before any other work is done. Length; default: not looked at.
@@ -47,6 +52,7 @@ impl Default for RepairParams {
             keep_components: KeepComponents::All,
             non_manifold: NonManifold::Cut,
             self_intersections: SelfIntersections::Report,
+            bodies: Bodies::Keep,
             crossing_length: None,
             max_move: None,
         }
@@ -71,6 +77,19 @@ pub enum SelfIntersections {
     /// They are counted, and the first ones are listed.
     #[default]
     Report,
+    /// They are cut, and what is inside of bodies goes.
+    Remove,
+}
+
+/// What becomes of bodies that run through or touch each other.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Bodies {
+    /// Each is looked at by itself.
+    #[default]
+    Keep,
+    /// They become one.
+    Union,
 }
 
 /// Which holes are filled.

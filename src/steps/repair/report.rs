@@ -85,6 +85,9 @@ pub struct RepairStats {
     pub counting_stopped: bool,
     /// The first faces of the result that run through others.
     pub self_intersecting_faces: Vec<u32>,
+    /// What removing faces that run through each other did; absent where that was not asked for, or there were none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub removal: Option<RemovalStats>,
     /// How far the surface may have moved outside filled holes at most: a bound, in mesh units.
     pub max_move: f64,
     /// Borders that lie beside each other and are not joined; a run says it.
@@ -146,6 +149,32 @@ impl RepairStats {
         self.cavities = more.cavities;
         self.degenerate_faces_left = more.degenerate_faces_left;
     }
+}
+
+/// What removing faces that run through each other did.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub struct RemovalStats {
+    /// Pairs of faces that ran through or touched each other, when all else was repaired.
+    pub pairs: u64,
+    /// Rounds of cutting and rounding.
+    pub rounds: u64,
+    /// Faces that met others, or were beside such; of the round with the most.
+    pub faces_cut: u64,
+    /// Pieces that were inside of bodies, or further ones of those that lie on each other.
+    pub pieces_removed: u64,
+    /// Their area.
+    pub area_removed: f64,
+    /// How far a vertex went at most when it was rounded.
+    pub largest_move: f64,
+    /// Pairs that are left.
+    pub pairs_left: u64,
+    /// Where the first faces are that still meet others.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub left_at: Vec<[f64; 3]>,
+    /// Why removing stopped before its end.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub stopped: Option<String>,
 }
 
 /// A boundary loop.

@@ -10,13 +10,19 @@ use super::extract::Chosen;
 use crate::mesh::geometry::{closest_on_segment, closest_on_triangle};
 use crate::mesh::{Carried, EdgeKey, FaceId, Facet, Field, Regions, Soup, Support, Surface, VertexId, edge_key};
 
-/// Pieces of a surface's faces.
-#[derive(Clone, Debug, PartialEq)]
+/// Pieces of a surface's faces: no manifold in general.
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Part {
-    /// The pieces, with what they carry: no manifold in general.
-    pub soup: Soup,
+    /// Where the pieces have corners.
+    pub points: Vec<DVec3>,
+    /// The vertex of the surface that each point is.
+    pub vertices: Vec<Option<VertexId>>,
+    /// The pieces, by their corners among the points.
+    pub faces: Vec<[u32; 3]>,
     /// The face that each is a part of.
     pub origin: Vec<FaceId>,
+    /// Points this near to an edge of their face lie on it.
+    pub reach: f64,
 }
 
 /// Where a vertex comes from: a face, and weights of its corners; of a vertex all weight is its own.
@@ -27,31 +33,68 @@ struct Source {
 }
 
 impl Part {
-    /// Nodes within `reach` of an edge of their face lie on it.
-    pub(super) fn new(surface: &Surface, complex: &Complex<'_>, origin: &[u32], chosen: &[Chosen], reach: f64) -> Self {
+    pub(super) fn new(complex: &Complex<'_>, origin: &[u32], chosen: &[Chosen], reach: f64) -> Self {
         let mut number = vec![NONE; complex.places.len()];
-        let (mut soup, mut sources, mut faces) = (Soup::default(), Vec::new(), Vec::new());
+        let mut part = Self { reach, ..Self::default() };
         for &(corners, f) in chosen {
-            let face = FaceId::from_raw(origin[f as usize]);
             let corners = corners.map(|node| {
                 let known = &mut number[node as usize];
                 if *known == NONE {
-                    let place = complex.places[node as usize];
-                    *known = soup.points.push(place).raw();
-                    let vertex = ((node as usize) < complex.vertices).then_some(VertexId::from_raw(node));
-                    sources.push(Source {
-                        face,
-                        weights: closest_on_triangle(place, surface.corners(face)).weights,
-                        vertex,
-                    });
+                    *known = part.points.len() as u32;
+                    part.points.push(complex.places[node as usize]);
+                    let vertex = (node as usize) < complex.vertices;
+                    part.vertices.push(vertex.then_some(VertexId::from_raw(node)));
                 }
-                VertexId::from_raw(*known)
+                *known
             });
-            soup.faces.push(Facet::Tri(corners));
-            faces.push(face);
+            part.faces.push(corners);
+            part.origin.push(FaceId::from_raw(origin[f as usize]));
         }
-        soup.carried = carried(surface, &soup, &sources, &faces, reach);
-        Self { soup, origin: faces }
+        part
+    }
+
+    /// All faces of a surface, as they are.
+    pub fn whole(surface: &Surface) -> Self {
+        Self {
+            points: surface.points.as_slice().to_vec(),
+            vertices: surface.points.ids().map(Some).collect(),
+            faces: surface.faces.iter().map(|face| face.map(VertexId::raw)).collect(),
+            origin: surface.faces.ids().collect(),
+            reach: 0.0,
+        }
+    }
+
+    /// Adds pieces of another surface, whose vertices and faces are these of this one.
+    pub fn append(&mut self, other: Self, vertices: &[VertexId], faces: &[FaceId]) {
+        let base = self.points.len() as u32;
+        self.points.extend(other.points);
+        self.vertices.extend(other.vertices.into_iter().map(|v| v.map(|v| vertices[v.index()])));
+        self.faces.extend(other.faces.into_iter().map(|face| face.map(|v| v + base)));
+        self.origin.extend(other.origin.into_iter().map(|f| faces[f.index()]));
+        self.reach = self.reach.max(other.reach);
+    }
+
+    /// The pieces with all that the surface carries.
+    pub fn to_soup(&self, surface: &Surface) -> Soup {
+        let faces = self.faces.iter().map(|face| Facet::Tri(face.map(VertexId::from_raw))).collect();
+        let mut soup = Soup { points: self.points.clone().into(), faces, carried: Carried::default() };
+        soup.carried = carried(surface, &soup, &self.sources(surface), &self.origin, self.reach);
+        soup
+    }
+
+    fn sources(&self, surface: &Surface) -> Vec<Source> {
+        let mut face_at = vec![FaceId::from_raw(0); self.points.len()];
+        for (corners, &face) in self.faces.iter().zip(&self.origin).rev() {
+            for &v in corners {
+                face_at[v as usize] = face;
+            }
+        }
+        let all = face_at.into_iter().zip(&self.points).zip(&self.vertices);
+        all.map(|((face, &point), &vertex)| {
+            let weights = closest_on_triangle(point, surface.corners(face)).weights;
+            Source { face, weights, vertex }
+        })
+        .collect()
     }
 }
 

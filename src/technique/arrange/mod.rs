@@ -112,7 +112,7 @@ pub fn resolve(surface: &Surface, meeting: &[u32], coarser: u32, watch: &Watch) 
     let bodies = extract::bodies(surface, &mesh);
     let windings = cells::windings(&complex, &bodies)?;
     let chosen = extract::choose(&complex, &windings);
-    let part = |faces: &[extract::Chosen]| Part::new(surface, &complex, &mesh.origin, faces, 4.0 * grid.unit);
+    let part = |faces: &[extract::Chosen]| Part::new(&complex, &mesh.origin, faces, 4.0 * grid.unit);
     Ok(Resolved {
         kept: part(&chosen.kept),
         removed: part(&chosen.removed),

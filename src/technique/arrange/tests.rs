@@ -34,9 +34,15 @@ fn resolved(surface: &Surface) -> Resolved {
     resolve(surface, &meeting, 0, &Watch::silent()).expect("a result")
 }
 
-fn corners(soup: &Soup) -> Vec<Triangle> {
-    let of = |facet: &Facet| [0, 1, 2].map(|k| soup.points[facet.corners()[k]]);
-    soup.faces.iter().map(of).collect()
+/// What stays, without what it carries.
+fn soup(result: &Resolved) -> Soup {
+    let faces = result.kept.faces.iter().map(|face| Facet::Tri(face.map(VertexId::from_raw))).collect();
+    Soup { points: result.kept.points.clone().into(), faces, ..Soup::default() }
+}
+
+fn corners(result: &Resolved) -> Vec<Triangle> {
+    let kept = &result.kept;
+    kept.faces.iter().map(|face| face.map(|v| kept.points[v as usize])).collect()
 }
 
 fn volume(triangles: &[Triangle]) -> f64 {
@@ -116,11 +122,10 @@ fn common_volume(a: &[Triangle], b: &[Triangle]) -> f64 {
 /// What must hold of any result of closed bodies: closed, nothing meets, and the volume is that of the union.
 fn check_union(a: &[Triangle], b: &[Triangle], common: f64) -> Resolved {
     let result = resolved(&surface_of(&[a.to_vec(), b.to_vec()]));
-    let soup = &result.kept.soup;
-    assert_eq!(pairs(soup), 0);
-    assert!(is_closed(soup));
+    assert_eq!(pairs(&soup(&result)), 0);
+    assert!(is_closed(&soup(&result)));
     let expected = volume(a) + volume(b) - common;
-    let found = volume(&corners(soup));
+    let found = volume(&corners(&result));
     assert!((found - expected).abs() <= 1e-6 * expected, "{found} is not {expected}");
     result
 }
@@ -151,15 +156,15 @@ proptest! {
         let exact = |p: DVec3| (p * 1_048_576.0).round() / 1_048_576.0;
         let corners_of = |x: &[f64]| [vector(x), vector(x) + size * vector(&x[3..]), vector(x) + size * vector(&x[6..])];
         let triangle = |x: &[f64]| corners_of(x).map(exact);
-        let soup: Vec<Vec<Triangle>> = x.chunks(9).map(|x| vec![triangle(x)]).collect();
-        let surface = surface_of(&soup);
+        let triangles: Vec<Vec<Triangle>> = x.chunks(9).map(|x| vec![triangle(x)]).collect();
+        let surface = surface_of(&triangles);
         let result = resolved(&surface);
         let kept = &result.kept;
-        prop_assert_eq!(pairs(&kept.soup), 0);
+        prop_assert_eq!(pairs(&soup(&result)), 0);
         prop_assert_eq!(result.moved, 0.0);
         prop_assert!(result.removed.origin.is_empty());
-        let mut area = vec![0.0; soup.len()];
-        for (&face, piece) in kept.origin.iter().zip(corners(&kept.soup)) {
+        let mut area = vec![0.0; triangles.len()];
+        for (&face, piece) in kept.origin.iter().zip(corners(&result)) {
             let whole = surface.corners(face);
             // Each piece looks as its face does.
             prop_assert!(area_vector(piece).dot(area_vector(whole)) >= 0.0);
@@ -179,9 +184,9 @@ proptest! {
         let factor = libm::ldexp(1.0, power);
         let scaled = bodies.map(|body| body.into_iter().map(|t| t.map(|p| factor * p)).collect());
         let other = resolved(&surface_of(&scaled));
-        prop_assert_eq!(&one.kept.soup.faces, &other.kept.soup.faces);
+        prop_assert_eq!(&one.kept.faces, &other.kept.faces);
         prop_assert_eq!(&one.kept.origin, &other.kept.origin);
-        for (p, q) in one.kept.soup.points.iter().zip(&other.kept.soup.points) {
+        for (p, q) in one.kept.points.iter().zip(&other.kept.points) {
             prop_assert_eq!(*p * factor, *q);
         }
     }
@@ -226,10 +231,10 @@ fn a_body_that_lies_on_its_copy_is_one() {
     turned.rotate_left(5);
     let third = self::body(false, map, dvec3(0.1, 0.9, 0.3));
     let result = resolved(&surface_of(&[body.clone(), turned, third.clone()]));
-    assert_eq!(pairs(&result.kept.soup), 0);
-    assert!(is_closed(&result.kept.soup));
+    assert_eq!(pairs(&soup(&result)), 0);
+    assert!(is_closed(&soup(&result)));
     let expected = volume(&body) + volume(&third) - common_volume(&body, &third);
-    assert!((volume(&corners(&result.kept.soup)) - expected).abs() < 1e-6);
+    assert!((volume(&corners(&result)) - expected).abs() < 1e-6);
 }
 
 #[test]
@@ -238,9 +243,9 @@ fn a_sheet_through_a_body_is_cut_and_stays() {
     let surface = surface_of(&[cube(DVec3::ZERO), sheet.clone()]);
     let result = resolved(&surface);
     let of_sheet = |(face, piece): (&crate::mesh::FaceId, Triangle)| (face.raw() == 12).then(|| triangle_area(piece));
-    let area: f64 = result.kept.origin.iter().zip(corners(&result.kept.soup)).filter_map(of_sheet).sum();
+    let area: f64 = result.kept.origin.iter().zip(corners(&result)).filter_map(of_sheet).sum();
     assert!((area - triangle_area(sheet[0])).abs() < 1e-6);
-    assert_eq!(pairs(&result.kept.soup), 0);
+    assert_eq!(pairs(&soup(&result)), 0);
     assert!(result.removed.origin.is_empty() && result.kept.origin.len() > 13);
 }
 
@@ -255,8 +260,8 @@ fn mirrored_and_far_away_it_is_the_same() {
         bodies.map(|body| body.into_iter().map(|[a, b, c]| [a, c, b].map(|p| p * dvec3(-1.0, 1.0, 1.0))).collect());
     for other in [resolved(&surface_of(&moved)), resolved(&surface_of(&mirrored))] {
         assert_eq!(one.kept.origin.len(), other.kept.origin.len());
-        assert_eq!(pairs(&other.kept.soup), 0);
-        let [ours, theirs] = [&one, &other].map(|result| volume(&corners(&result.kept.soup)));
+        assert_eq!(pairs(&soup(&other)), 0);
+        let [ours, theirs] = [&one, &other].map(|result| volume(&corners(result)));
         assert!((ours - theirs).abs() < 1e-6 * ours);
     }
 }
@@ -266,8 +271,9 @@ fn faces_that_meet_none_keep_their_bits() {
     let third = 1.0 / 3.0;
     let away = cube(dvec3(10.0 + third, third, third));
     let surface = surface_of(&[cube(DVec3::splat(third)), cube(dvec3(1.1, 0.7, 0.9)), away.clone()]);
-    let kept = resolved(&surface).kept;
+    let result = resolved(&surface);
+    let kept = &result.kept;
     let found: Vec<Triangle> =
-        kept.origin.iter().zip(corners(&kept.soup)).filter(|(face, _)| face.raw() >= 24).map(|(_, t)| t).collect();
+        kept.origin.iter().zip(corners(&result)).filter(|(face, _)| face.raw() >= 24).map(|(_, t)| t).collect();
     assert_eq!(found, away);
 }

@@ -1,0 +1,130 @@
+//! Faces that run through each other are cut, and what is inside of bodies goes.
+
+use meshmill::mesh::Regions;
+use meshmill::metric::intersection::self_intersections;
+use meshmill::steps::repair::{Bodies, SelfIntersections, repair_and_remove};
+
+use super::*;
+
+fn removing(bodies: Bodies) -> RepairParams {
+    RepairParams { self_intersections: SelfIntersections::Remove, bodies, ..RepairParams::default() }
+}
+
+/// Repairs, and checks that no two faces of the result meet.
+fn solid(soup: &Soup) -> (Surface, RepairStats) {
+    let (surface, stats) = run_with(soup, &removing(Bodies::Union));
+    let pairs = self_intersections(&surface.to_soup(), &Watch::silent()).expect("nobody interrupts").pairs;
+    assert_eq!((pairs.len(), stats.self_intersections), (0, 0));
+    (surface, stats)
+}
+
+#[test]
+fn bodies_that_run_through_each_other_become_one() {
+    let soup = merged(cube([0.0; 3]), &cube([0.5, 0.4, 0.3]));
+    let (surface, stats) = solid(&soup);
+    assert_eq!(euler(&surface), (2, 0));
+    assert!((volume(&surface) - (2.0 - 0.5 * 0.6 * 0.7)).abs() < 1e-8, "{}", volume(&surface));
+    let removal = stats.removal.expect("something was removed");
+    assert!(removal.pairs == stats.self_intersections_before && removal.pairs > 0, "{removal:?}");
+    assert!(removal.rounds == 1 && removal.pairs_left == 0 && removal.stopped.is_none(), "{removal:?}");
+    // Three sides of each cube have a part in the other one: 0.3, 0.35 and 0.42.
+    assert!((removal.area_removed - 2.0 * (0.3 + 0.35 + 0.42)).abs() < 1e-8, "{removal:?}");
+    let removed = repair_and_remove(&soup, &removing(Bodies::Union), &Watch::silent()).expect("repairs").1;
+    assert_eq!(removed.faces.len() as u64, removal.pieces_removed);
+}
+
+#[test]
+fn bodies_that_are_kept_stay_as_they_are() {
+    let soup = merged(cube([0.0; 3]), &cube([0.5, 0.4, 0.3]));
+    let (surface, stats) = run_with(&soup, &removing(Bodies::Keep));
+    let (reported, _) = run(&soup);
+    assert_eq!(surface, reported);
+    assert!(stats.self_intersections > 0 && stats.removal.is_some_and(|removal| removal.rounds == 0));
+}
+
+/// A sphere of which one vertex is pulled through the other side.
+fn pierced() -> Soup {
+    let mut soup = sphere(16, 0, 16);
+    let top = soup.points.iter().map(|p| p.z).fold(0.0, f64::max);
+    soup.points.iter_mut().filter(|p| p.z == top).for_each(|p| *p = DVec3::new(0.1, 0.2, -1.5));
+    soup
+}
+
+#[test]
+fn a_body_that_runs_through_itself_is_cut_and_another_one_beside_it_is_not() {
+    let soup = merged(pierced(), &cube([0.2, 0.2, -0.2]));
+    let (surface, stats) = run_with(&soup, &removing(Bodies::Keep));
+    // What is left meets the other body only.
+    let left = self_intersections(&surface.to_soup(), &Watch::silent()).expect("nobody interrupts").pairs;
+    assert!(stats.removal.is_some_and(|removal| removal.rounds > 0 && removal.pieces_removed > 0));
+    // The cube is the last body.
+    let is_cube = |f: meshmill::mesh::FaceId| f.index() + 12 >= surface.faces.len();
+    assert!(left.iter().all(|&(f, g, _)| is_cube(f) != is_cube(g)), "{left:?}");
+    let (alone, _) = solid(&pierced());
+    assert_eq!(euler(&alone).1, 0);
+    let (united, _) = solid(&soup);
+    assert!(volume(&united) > volume(&alone));
+}
+
+#[test]
+fn bodies_that_touch_are_valid_in_any_way() {
+    // By a face in part, an edge, a part of it, a corner, an edge on a face.
+    for at in [[1.0, 0.25, 0.5], [1.0, 1.0, 0.0], [1.0, 1.0, 0.5], [1.0, 1.0, 1.0], [1.0, 1.0, 0.25]] {
+        let (surface, _) = solid(&merged(cube([0.0; 3]), &cube(at)));
+        assert_eq!(euler(&surface).1, 0);
+        assert!((volume(&surface) - 2.0).abs() < 1e-8, "{at:?}: {}", volume(&surface));
+    }
+    let (joined, _) = solid(&merged(cube([0.0; 3]), &cube([1.0, 0.25, 0.5])));
+    assert_eq!(euler(&joined).0, 2);
+    let (apart, _) = solid(&merged(cube([0.0; 3]), &cube([1.0, 1.0, 0.0])));
+    assert_eq!(euler(&apart).0, 4);
+}
+
+#[test]
+fn a_body_inside_of_another_stays() {
+    let mut inner = cube([0.4, 0.4, 0.4]);
+    inner.points.iter_mut().for_each(|p| *p = DVec3::splat(0.3) + 0.2 * (*p - DVec3::splat(0.4)));
+    let soup = merged(merged(cube([0.0; 3]), &inner), &cube([0.75, 0.0, 0.0]));
+    let (surface, stats) = solid(&soup);
+    assert_eq!((euler(&surface), stats.cavities), ((4, 0), 1));
+    assert!((volume(&surface) - (1.75 - 0.008)).abs() < 1e-8);
+}
+
+#[test]
+fn sheets_are_cut_along_where_they_meet_and_stay() {
+    let square = |at: [[f64; 3]; 4]| soup(&at, &[[0, 1, 2], [0, 2, 3]]);
+    let flat = square([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]]);
+    let upright = square([[-0.5, 0.1, -1.0], [0.5, 0.2, -1.0], [0.5, 0.2, 1.0], [-0.5, 0.1, 1.0]]);
+    let (surface, _) = solid(&merged(flat, &upright));
+    let area: f64 = surface.faces.ids().map(|f| meshmill::mesh::geometry::triangle_area(surface.corners(f))).sum();
+    assert!((area - (4.0 + 2.0 * 1.01_f64.sqrt())).abs() < 1e-8, "{area}");
+}
+
+#[test]
+fn what_faces_carry_goes_along() {
+    let mut soup = merged(cube([0.0; 3]), &cube([0.5, 0.4, 0.3]));
+    let second = || (12..24).map(meshmill::mesh::FaceId::new);
+    soup.carried.groups.faces.insert("second".to_owned(), second().collect());
+    let labels = (0..24).map(|f| u32::from(f >= 12)).collect::<Vec<_>>().into();
+    soup.carried.regions = Some(Regions { labels, names: vec!["a".to_owned(), "b".to_owned()] });
+    let (surface, _) = solid(&soup);
+    let group = &surface.carried.groups.faces["second"];
+    let regions = surface.carried.regions.as_ref().expect("regions");
+    let mut area = 0.0;
+    for f in surface.faces.ids() {
+        assert_eq!(regions.labels[f] == 1, group.binary_search(&f).is_ok());
+        if regions.labels[f] == 1 {
+            area += meshmill::mesh::geometry::triangle_area(surface.corners(f));
+        }
+    }
+    assert!((area - (6.0 - (0.3 + 0.35 + 0.42))).abs() < 1e-8, "{area}");
+}
+
+#[test]
+fn where_nothing_meets_nothing_changes() {
+    for soup in [cube([0.1; 3]), sphere(16, 0, 16), sphere(16, 2, 16), merged(cube([0.0; 3]), &cube([3.0, 0.0, 0.0]))] {
+        let (reported, stats) = run(&soup);
+        let (removed, other) = run_with(&soup, &removing(Bodies::Union));
+        assert_eq!((reported, stats), (removed, other));
+    }
+}
