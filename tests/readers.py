@@ -1,15 +1,17 @@
 #!/usr/bin/env python3
-"""Reads every writer's file back with other programs: meshio, Gmsh and VTK, whichever know the format.
+"""Reads every writer's file back with other programs: meshio, Gmsh, VTK, Open3D and CalculiX, whichever know the format.
 
     python3 tests/readers.py --meshmill target/debug/meshmill
 
 Makes a virtual environment beside the build (target/readers), runs one recipe that writes a part with groups, fields and
 second-order elements in every format, and counts nodes, faces, groups and fields of each file as the others see them. What
-a program does not know of a format is listed below with its reason; all else must be there.
+a program does not know of a format is listed below with its reason; all else must be there. CalculiX is a program of
+the system (`ccx`: apt-get install calculix-ccx) and takes each deck into an analysis. What is not there is skipped aloud.
 """
 import argparse
 import json
 import os
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -20,7 +22,7 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "examples" / "compare"))
 import environment  # noqa: E402
 
-PACKAGES = ["meshio==5.3.5", "gmsh==4.15.2", "vtk==9.7.2"]
+PACKAGES = ["meshio==5.3.5", "gmsh==4.15.2", "vtk==9.7.2", "open3d==0.20.0"]
 
 # A box. Its sides are in no group, its bottom and its top are.
 PART = """v 0 0 0
@@ -113,13 +115,43 @@ UNKNOWN = {
     ("vtk", "msh2"): "VTK does not know the format",
     ("vtk", "bdf"): "VTK does not know the format",
     ("vtk", "off"): "VTK does not know the format",
+    ("open3d", "q.obj"): "Open3D passes over the quads in it",
+    **{("open3d", ending): "Open3D does not know the format" for ending in "vtu vtp vtk inp msh msh2 bdf".split()},
+    **{("ccx", ending): "CalculiX does not know the format"
+       for ending in "stl obj ply off vtu vtp vtk msh msh2 bdf".split()},
 }
 GROUPS_OF = {
     "meshio": {"vtu", "vtk", "inp"},
     "gmsh": {"msh", "msh2"},
     "vtk": {"vtu", "vtp", "vtk"},
+    "open3d": set(),
+    "ccx": {"inp"},
 }
-FIELDS_OF = {"meshio": {"vtu", "vtk", "msh", "msh2"}, "gmsh": {"msh", "msh2"}, "vtk": {"vtu", "vtp", "vtk"}}
+FIELDS_OF = {
+    "meshio": {"vtu", "vtk", "msh", "msh2"},
+    "gmsh": {"msh", "msh2"},
+    "vtk": {"vtu", "vtp", "vtk"},
+    "open3d": set(),
+    "ccx": set(),
+}
+
+# An analysis without loads, which prints what CalculiX took in: every node, every element, and the groups.
+ANALYSIS = """*INCLUDE, INPUT={deck}
+*MATERIAL, NAME=any
+*ELASTIC
+1, 0.3
+*SHELL SECTION, ELSET=Eall, MATERIAL=any
+0.01
+*BOUNDARY
+Nall, 1, 3
+*STEP
+*STATIC
+*NODE PRINT, NSET=Nall
+U
+*EL PRINT, ELSET=Eall
+S
+{groups}*END STEP
+"""
 
 
 def read_meshio(file):
@@ -178,7 +210,42 @@ def read_vtk(file):
     return mesh.GetNumberOfPoints(), faces, {a.split(":", 1)[1] for a in arrays if "group:" in a}, arrays
 
 
-READERS = {"meshio": read_meshio, "gmsh": read_gmsh, "vtk": read_vtk}
+def read_open3d(file):
+    import open3d
+
+    open3d.utility.set_verbosity_level(open3d.utility.VerbosityLevel.Error)
+    mesh = open3d.io.read_triangle_mesh(str(file))
+    if file.suffix == ".stl":  # each triangle has corners of its own
+        mesh.remove_duplicated_vertices()
+    count = len(mesh.triangles)
+    # Quads come in as two triangles each.
+    faces = Counter(quad=count // 2) if file.stem.startswith("q") else Counter(triangle=count)
+    return len(mesh.vertices), faces, set(), set()
+
+
+def read_ccx(file):
+    folder = file.parent / f"ccx-{file.stem}"
+    folder.mkdir()
+    shutil.copy(file, folder)
+    sets = ["bottom", "top"], [] if file.stem.startswith("q") else ["rim", "dots"]
+    groups = "".join(f"*EL PRINT, ELSET={name}\nS\n" for name in sets[0])
+    groups += "".join(f"*NODE PRINT, NSET={name}\nU\n" for name in sets[1])
+    (folder / "analysis.inp").write_text(ANALYSIS.format(deck=file.name, groups=groups))
+    done = subprocess.run(["ccx", "-i", "analysis"], cwd=folder, capture_output=True, text=True, timeout=60)
+    complaints = [line.strip() for line in done.stdout.splitlines() if "ERROR" in line or "WARNING" in line]
+    if complaints:
+        raise ValueError("; ".join(complaints))
+    printed, block = {}, None
+    for words in map(str.split, (folder / "analysis.dat").read_text().splitlines()):
+        if "set" in words:
+            block = printed.setdefault(words[words.index("set") + 1].lower(), set())
+        elif words:
+            block.add(int(words[0]))
+    kind = {"t": "triangle", "t6": "triangle6", "q": "quad", "q8": "quad8"}[file.stem]
+    return len(printed["nall"]), Counter({kind: len(printed["eall"])}), set(printed), set()
+
+
+READERS = {"meshio": read_meshio, "gmsh": read_gmsh, "vtk": read_vtk, "open3d": read_open3d, "ccx": read_ccx}
 
 
 def faults(program, file):
@@ -200,7 +267,10 @@ def faults(program, file):
 
 def one(program, file):
     try:
-        __import__(program)
+        if program != "ccx":
+            __import__(program)
+        elif shutil.which(program) is None:
+            raise ImportError("there is no `ccx` here (apt-get install calculix-ccx)")
     except (ImportError, OSError) as error:
         return ["SKIPPED", str(error)]
     try:
