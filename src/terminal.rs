@@ -5,7 +5,7 @@ use std::borrow::Cow;
 
 /// The text with everything as escapes that moves a cursor, sets a colour, breaks a line or turns the direction of
 /// writing: `\u{1b}` for the escape character. Ordinary text of any script is left as it is.
-pub fn printable(text: &str) -> Cow<'_, str> {
+pub(crate) fn printable(text: &str) -> Cow<'_, str> {
     if !text.chars().any(steers) {
         return Cow::Borrowed(text);
     }
@@ -13,7 +13,7 @@ pub fn printable(text: &str) -> Cow<'_, str> {
 }
 
 /// The same for a text of several lines, whose breaks are meant.
-pub fn printable_lines(text: &str) -> Cow<'_, str> {
+pub(crate) fn printable_lines(text: &str) -> Cow<'_, str> {
     if text.lines().all(|line| matches!(printable(line), Cow::Borrowed(_))) {
         return Cow::Borrowed(text);
     }
@@ -21,7 +21,7 @@ pub fn printable_lines(text: &str) -> Cow<'_, str> {
 }
 
 /// Control characters, the directional marks and overrides of Unicode, and its separators of lines and paragraphs.
-pub fn steers(letter: char) -> bool {
+pub(crate) fn steers(letter: char) -> bool {
     letter.is_control()
         || matches!(letter, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }
