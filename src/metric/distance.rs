@@ -36,9 +36,11 @@ use crate::mesh::geometry::triangle_area;
 use crate::mesh::{FaceId, IdVec, Soup, VertexId};
 use crate::watch::{Cancelled, Watch};
 
+mod inside;
 mod memo;
 mod piece;
 
+pub use inside::Inside;
 pub use memo::Memo;
 use memo::{Key, key_of};
 use piece::{Limits, refine};
@@ -280,7 +282,7 @@ fn refine_all(
     from: &Target,
     to: &Target,
     corners: &[(f64, u32)],
-    limits: &Limits,
+    limits: &Limits<'_>,
     open: Open<'_>,
     watch: &Watch,
 ) -> Result<Vec<piece::Bound>, Cancelled> {
@@ -326,6 +328,28 @@ pub fn decide_where(
     to: &Target,
     threshold: f64,
     wanted: Wanted<'_>,
+    memo: Option<&mut Memo>,
+    watch: &Watch,
+) -> Result<Option<Decision>, Cancelled> {
+    decide_parts(from, to, threshold, (wanted, None), memo, watch)
+}
+
+/// The same for those parts of the first mesh that are not inside of the second one's bodies.
+pub fn decide_outside(
+    from: &Target,
+    to: &Target,
+    threshold: f64,
+    hidden: &Inside,
+    watch: &Watch,
+) -> Result<Option<Decision>, Cancelled> {
+    decide_parts(from, to, threshold, (&|_| true, Some(hidden)), None, watch)
+}
+
+fn decide_parts(
+    from: &Target,
+    to: &Target,
+    threshold: f64,
+    (wanted, hidden): (Wanted<'_>, Option<&Inside>),
     mut memo: Option<&mut Memo>,
     watch: &Watch,
 ) -> Result<Option<Decision>, Cancelled> {
@@ -333,7 +357,9 @@ pub fn decide_where(
         return Ok(None);
     }
     if let Some((origin, [from, to])) = nearer(from, to) {
-        let mut found = decide_where(&from, &to, threshold + rounding_at(origin), wanted, memo, watch)?;
+        let hidden = hidden.map(|hidden| hidden.moved(origin));
+        let parts = (wanted, hidden.as_ref());
+        let mut found = decide_parts(&from, &to, threshold + rounding_at(origin), parts, memo, watch)?;
         found.iter_mut().flat_map(|found| &mut found.beyond).for_each(|(_, at, _)| *at += origin);
         return Ok(found);
     }
@@ -344,7 +370,8 @@ pub fn decide_where(
     let corners = corner_distances(from, to, &open);
     watch.check()?;
     let limit = threshold * (1.0 + 1e-9) + rounding(from, to);
-    let refined = refine_all(from, to, &corners, &Limits::new(limit, 0.0, limit, to), &open, watch)?;
+    let limits = Limits::new(limit, 0.0, limit, to).without(hidden);
+    let refined = refine_all(from, to, &corners, &limits, &open, watch)?;
     let upper = if known.contains(&true) { limit } else { 0.0 };
     let mut out = Decision { holds: true, beyond: Vec::new(), undecided: Vec::new(), upper };
     for (t, bound) in refined.iter().enumerate() {
@@ -360,6 +387,23 @@ pub fn decide_where(
     }
     out.holds = out.beyond.is_empty() && out.undecided.is_empty();
     Ok(Some(out))
+}
+
+/// The part of the diagonal below which distances from outside parts are not told apart.
+const FINEST: f64 = 1e-4;
+
+/// A certified bound of the largest distance from those parts of one mesh that are not inside of another one's bodies;
+/// `None` where one has no triangle.
+pub fn outside_bound(from: &Target, to: &Target, hidden: &Inside, watch: &Watch) -> Result<Option<f64>, Cancelled> {
+    let mut threshold = FINEST * to.bvh.bounds().diagonal();
+    loop {
+        let found = decide_outside(from, to, threshold, hidden, watch)?;
+        match found {
+            // Once all is within, the bound of that is it; what is far is looked at more coarsely.
+            Some(found) if !found.holds && threshold.is_finite() && threshold > 0.0 => threshold *= 4.0,
+            found => return Ok(found.map(|found| found.upper)),
+        }
+    }
 }
 
 /// Both ways between a mesh and its reference.

@@ -124,6 +124,14 @@ impl<'a> Subject<'a> {
         *kept(&self.pair.bounds[usize::from(from_reference)], compute)
     }
 
+    /// A certified upper bound of the distance from those parts of the reference that are not inside of the mesh's
+    /// bodies. Absent as [`Self::distance`] is.
+    pub fn outer_bound(&self) -> Option<f64> {
+        let reference = self.reference()?;
+        let hidden = distance::Inside::of(self.mesh);
+        distance::outside_bound(reference.target(), self.target(), &hidden, self.watch).ok().flatten()
+    }
+
     /// Deviation of marked edges from those of the reference.
     pub fn features(&self) -> Option<&FeatureDeviation> {
         let reference = self.reference()?;

@@ -74,7 +74,12 @@ impl Chain<'_> {
             | "min-scaled-jacobian"
             | "mean-scaled-jacobian"
             | "inverted-quads" => self.shape(row),
-            "distance" | "distance-to-reference" | "distance-from-reference" | "feature-deviation" => self.distance(),
+            "distance"
+            | "distance-to-reference"
+            | "distance-from-reference"
+            | "outer-distance"
+            | "outer-distance-from-reference"
+            | "feature-deviation" => self.distance(),
             "max-size" | "mean-size" | "max-edge" | "mean-edge" => {
                 self.turn("lower", &["max-size", "max-edge", "size", "interval"])
             }

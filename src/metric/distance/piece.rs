@@ -3,11 +3,11 @@
 use glam::DVec3;
 use smallvec::{SmallVec, smallvec};
 
-use super::Target;
+use super::{Inside, Target};
 use crate::mesh::geometry::{area_vector, closest_on_triangle, triangle_size};
 
 /// When a piece is good enough, and how much work a face may cost.
-pub(super) struct Limits {
+pub(super) struct Limits<'a> {
     /// A piece with a bound of at most this is not cut.
     accept: f64,
     /// Nor one with a bound that exceeds what the face reaches by at most this.
@@ -16,6 +16,8 @@ pub(super) struct Limits {
     give_up: f64,
     /// A piece of a smaller radius is not cut.
     radius: f64,
+    /// What is inside of these bodies does not count.
+    hidden: Option<&'a Inside>,
 }
 
 /// Pieces for a face that is the whole area, and for any: a large face may lie over all faces of the other mesh, so
@@ -23,9 +25,19 @@ pub(super) struct Limits {
 const PIECES_BY_AREA: f64 = 40e6;
 const FEWEST: usize = 2048;
 
-impl Limits {
+impl<'a> Limits<'a> {
     pub(super) fn new(accept: f64, slack: f64, give_up: f64, to: &Target) -> Self {
-        Self { accept, slack, give_up, radius: 1e-10 * to.bvh.bounds().diagonal() }
+        Self { accept, slack, give_up, radius: 1e-10 * to.bvh.bounds().diagonal(), hidden: None }
+    }
+
+    /// The same, where what is inside of bodies does not count.
+    pub(super) fn without(self, hidden: Option<&'a Inside>) -> Self {
+        Self { hidden, ..self }
+    }
+
+    /// Whether a point is inside of the bodies in which nothing counts.
+    fn holds(&self, point: DVec3) -> bool {
+        self.hidden.is_some_and(|hidden| hidden.holds(point))
     }
 }
 
@@ -43,8 +55,8 @@ pub(super) struct Bound {
 }
 
 impl Bound {
-    fn reach(&mut self, distance: f64, at: DVec3) {
-        if distance > self.lower {
+    fn reach(&mut self, distance: f64, at: DVec3, limits: &Limits<'_>) {
+        if distance > self.lower && (distance <= limits.accept || !limits.holds(at)) {
             (self.lower, self.at) = (distance, at);
         }
     }
@@ -91,7 +103,7 @@ fn less(a: (f64, u32), b: (f64, u32)) -> (f64, u32) {
 
 /// Bounds the largest distance of a face with these corners, each given with its squared distance and nearest triangle.
 /// `share` is the face's part of its mesh's area.
-pub(super) fn refine(corners: [(DVec3, (f64, u32)); 3], to: &Target, limits: &Limits, share: f64) -> Bound {
+pub(super) fn refine(corners: [(DVec3, (f64, u32)); 3], to: &Target, limits: &Limits<'_>, share: f64) -> Bound {
     let most_pieces = FEWEST + (share * PIECES_BY_AREA) as usize;
     let mut bound = Bound { at: corners[0].0, ..Bound::default() };
     let first: Piece = corners
@@ -99,7 +111,7 @@ pub(super) fn refine(corners: [(DVec3, (f64, u32)); 3], to: &Target, limits: &Li
         .map(|&(point, (distance_squared, nearest))| Corner { point, distance_squared, nearest })
         .collect();
     for c in &first {
-        bound.reach(c.distance_squared.sqrt(), c.point);
+        bound.reach(c.distance_squared.sqrt(), c.point, limits);
     }
     let mut stack: Vec<Piece> = vec![first];
     let mut seen = 0;
@@ -119,16 +131,26 @@ pub(super) fn refine(corners: [(DVec3, (f64, u32)); 3], to: &Target, limits: &Li
         let near = |c: &Corner| closest_on_triangle(centre, to.triangles[c.nearest as usize]).distance_squared;
         let known = piece.iter().map(near).fold(f64::INFINITY, f64::min);
         let Some(found) = to.bvh.closest_within(centre, known).or_else(|| to.bvh.closest(centre)) else { break };
-        bound.reach(found.distance(), centre);
+        bound.reach(found.distance(), centre, limits);
         let by_centre = (found.distance() + radius).min(to_triangle(&piece, to, found.index));
         let best = less(by_corners, (by_centre, found.index));
+        let is_hidden = best.0 > accept && limits.holds(centre);
+        if is_hidden && found.distance() > radius {
+            // As a whole on one side of the other mesh.
+            continue;
+        }
         if best.0 <= accept || radius <= limits.radius || seen >= most_pieces {
             bound.settle(best);
             continue;
         }
-        for part in cut(&piece, (centre, radius), found.index, to, accept) {
+        let parts = if is_hidden {
+            halves(&piece, centre, found.index, to)
+        } else {
+            cut(&piece, (centre, radius), found.index, to, accept)
+        };
+        for part in parts {
             for c in &part {
-                bound.reach(c.distance_squared.sqrt(), c.point);
+                bound.reach(c.distance_squared.sqrt(), c.point, limits);
             }
             stack.push(part);
         }
@@ -158,10 +180,7 @@ fn cut(piece: &Piece, (centre, radius): (DVec3, f64), t: u32, to: &Target, accep
     let fits = radius <= 2.0 * triangle_size(triangle);
     let inside = planes.iter().all(|&(a, outward)| (centre - a).dot(outward) < -1e-9 * radius);
     if planes.is_empty() || !fits || !inside {
-        let farthest = piece.iter().map(|c| c.point - centre);
-        let along = farthest.fold(DVec3::ZERO, |m, d| if d.length_squared() > m.length_squared() { d } else { m });
-        let (left, right) = split(piece, centre, along.normalize_or_zero(), t, to);
-        return smallvec![left, right];
+        return halves(piece, centre, t, to);
     }
     let mut parts = SmallVec::new();
     let mut rest = piece.clone();
@@ -176,6 +195,14 @@ fn cut(piece: &Piece, (centre, radius): (DVec3, f64), t: u32, to: &Target, accep
         parts.push(rest);
     }
     parts
+}
+
+/// Cuts a piece in two across its longest extent.
+fn halves(piece: &Piece, centre: DVec3, t: u32, to: &Target) -> SmallVec<[Piece; 4]> {
+    let farthest = piece.iter().map(|c| c.point - centre);
+    let along = farthest.fold(DVec3::ZERO, |m, d| if d.length_squared() > m.length_squared() { d } else { m });
+    let (left, right) = split(piece, centre, along.normalize_or_zero(), t, to);
+    smallvec![left, right]
 }
 
 /// Splits a convex piece by a plane: what lies below, and what lies above. Triangle `t` is near the cut and serves as

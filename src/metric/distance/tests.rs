@@ -52,6 +52,50 @@ fn both(a: &Soup, b: &Soup) -> TwoSided {
     two_sided(&Target::of(a), &Target::of(b), &Watch::silent()).expect("not cancelled").expect("triangles")
 }
 
+/// Both as one mesh.
+fn together(a: &Soup, b: &Soup, at: DVec3) -> Soup {
+    let mut all = a.clone();
+    let base = a.points.len() as u32;
+    b.points.iter().for_each(|&p| {
+        all.points.push(p + at);
+    });
+    for facet in &b.faces {
+        let mut facet = *facet;
+        facet.corners_mut().iter_mut().for_each(|v| *v = VertexId::from_raw(v.raw() + base));
+        all.faces.push(facet);
+    }
+    all
+}
+
+#[test]
+fn what_is_inside_of_bodies_does_not_count_where_it_is_not_to() {
+    let body = cube(1.0);
+    let outside = |reference: &Soup| {
+        let (from, to, watch) = (Target::of(reference), Target::of(&body), Watch::silent());
+        let hidden = Inside::of(&body);
+        let bound = outside_bound(&from, &to, &hidden, &watch).expect("not cancelled").expect("triangles");
+        let holds = |threshold: f64| {
+            decide_outside(&from, &to, threshold, &hidden, &watch).expect("not cancelled").expect("triangles").holds
+        };
+        // What the bound says is so, and less than what is reached is not.
+        assert!(holds(bound) && (bound < 0.01 || !holds(0.2 * bound)), "{bound}");
+        bound
+    };
+    assert!(outside(&together(&body, &cube(0.3), DVec3::ZERO)) < 1e-3);
+    // Walls that run through the body stick out by 0.3 on one side.
+    let sticks_out = outside(&together(&body, &cube(0.4), dvec3(0.9, 0.1, 0.05)));
+    assert!((0.3..0.3 * 4.0).contains(&sticks_out), "{sticks_out}");
+    // Nothing is inside of a sheet.
+    let mut open = body.clone();
+    open.faces = open.faces.iter().skip(1).copied().collect();
+    assert!(!Inside::of(&open).holds(DVec3::ZERO) && Inside::of(&body).holds(DVec3::ZERO));
+    assert!(!Inside::of(&body).holds(dvec3(1.5, 0.0, 0.0)));
+    // A cavity is not inside.
+    let mut cavity = cube(0.5);
+    cavity.faces.iter_mut().for_each(|facet| facet.corners_mut().swap(1, 2));
+    assert!(!Inside::of(&together(&body, &cavity, DVec3::ZERO)).holds(dvec3(0.1, 0.2, 0.3)));
+}
+
 #[test]
 fn far_from_the_origin_the_bound_is_as_good() {
     let near = [sphere(1.0, 6), sphere(1.01, 5)];

@@ -1,7 +1,7 @@
 //! Judging a mesh by the checks of a gate.
 
 use super::super::crossing::compare;
-use super::super::distance::{Decision, decide};
+use super::super::distance::{Decision, Inside, decide, decide_outside};
 use super::super::number::number_text;
 use super::super::registry::{MetricDef, Needs, Unit, find, lost_groups};
 use super::super::{Subject, Value};
@@ -302,12 +302,15 @@ fn judge_whole(subject: &Subject<'_>, metric: &MetricDef, bounds: &Bounds) -> Ga
     out
 }
 
+/// Distances for which what is inside of the mesh's bodies does not count.
+const OUTER: [&str; 2] = ["outer-distance", "outer-distance-from-reference"];
+
 /// Which ways a distance metric looks: from the mesh to the reference, and back.
 fn sides(metric: &str) -> Option<[bool; 2]> {
     match metric {
-        "distance" => Some([true, true]),
+        "distance" | "outer-distance" => Some([true, true]),
         "distance-to-reference" => Some([true, false]),
-        "distance-from-reference" => Some([false, true]),
+        "distance-from-reference" | "outer-distance-from-reference" => Some([false, true]),
         _ => None,
     }
 }
@@ -358,6 +361,7 @@ fn judge_distance(
         out.note = Some("a certified upper bound".to_owned());
         return Ok(out);
     }
+    let hidden = OUTER.contains(&check.metric.as_str()).then(|| Inside::of(subject.mesh()));
     let mut faults = Vec::new();
     let (mut undecided, mut upper, mut defined) = (0, 0.0_f64, true);
     for (wanted, from, to, kind) in
@@ -366,7 +370,12 @@ fn judge_distance(
         if !wanted {
             continue;
         }
-        let Some(decision) = decide(from, to, at_most, subject.watch())? else {
+        let hidden = hidden.as_ref().filter(|_| kind == FaultKind::ReferenceFace);
+        let decided = match hidden {
+            Some(hidden) => decide_outside(from, to, at_most, hidden, subject.watch())?,
+            None => decide(from, to, at_most, subject.watch())?,
+        };
+        let Some(decision) = decided else {
             defined = false;
             continue;
         };

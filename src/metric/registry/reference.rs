@@ -68,6 +68,22 @@ pub(super) static METRICS: &[MetricDef] = &[
         |s| number(s.distance().map(|d| d.from_reference.upper)),
     ),
     metric(
+        "outer-distance",
+        Length,
+        Lower,
+        Reference,
+        "The same as `distance`, where parts of the reference inside of the mesh's closed bodies do not count.",
+        |s| number(s.bound(false).zip(s.outer_bound()).map(|(to, from)| to.max(from))),
+    ),
+    metric(
+        "outer-distance-from-reference",
+        Length,
+        Lower,
+        Reference,
+        "The same as `distance-from-reference`, where parts of it inside of the mesh's closed bodies do not count.",
+        |s| number(s.outer_bound()),
+    ),
+    metric(
         "mean-distance-to-reference",
         Length,
         Lower,
