@@ -21,31 +21,12 @@ type Stamp = SmallVec<[(VertexId, u32); 4]>;
 const PARTS: usize = 16;
 const LEAST: usize = 128;
 
-/// An element by its number.
-pub(super) trait Numbered: Copy + Ord {
-    fn number(self) -> usize;
-}
-
-impl Numbered for EdgeId {
-    fn number(self) -> usize {
-        self.index()
-    }
-}
-
-impl Numbered for VertexId {
-    fn number(self) -> usize {
-        self.index()
-    }
-}
-
-/// The elements in an order in which neighbours are far from each other.
-pub(super) fn scattered<T: Numbered>(mut items: Vec<T>) -> Vec<T> {
-    // By the golden ratio: an odd factor, so that no two numbers fall together.
-    items.sort_unstable_by_key(|item| ((item.number() as u32).wrapping_mul(0x9E37_79B9), *item));
-    items
-}
-
 impl Work<'_> {
+    /// What the stars of vertices are like: another number whenever one of them changes.
+    pub(super) fn state(&self, near: &[VertexId]) -> u64 {
+        near.iter().map(|&v| u64::from(self.mesh.version(v))).sum()
+    }
+
     /// Goes through a list: `look` decides what is to be done from the stars of the vertices `near`, and `act` does it.
     pub(super) fn in_turn<T: Copy + Sync, P: Send>(
         &mut self,
@@ -85,18 +66,5 @@ impl Work<'_> {
         let h = halfedge_of(e);
         let apexes = [h, twin(h)].into_iter().filter_map(|side| self.mesh.apex(side));
         self.mesh.ends(e).into_iter().chain(apexes).collect()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn neighbours_are_far_apart() {
-        let order = scattered((0..1000).map(EdgeId::new).collect());
-        let mut places = vec![0_i64; 1000];
-        order.iter().enumerate().for_each(|(place, e)| places[e.index()] = place as i64);
-        assert!(places.windows(2).all(|pair| (pair[0] - pair[1]).abs() > 100));
     }
 }

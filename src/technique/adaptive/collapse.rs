@@ -3,7 +3,7 @@
 use glam::DVec3;
 use smallvec::SmallVec;
 
-use super::ahead::scattered;
+use super::order::scattered;
 use super::work::{Care, Corners, Faces, Work, stretch};
 use crate::mesh::edit::{CollapsePlan, Placement, check_collapse, collapse};
 use crate::mesh::halfedge::{edge_of, twin};

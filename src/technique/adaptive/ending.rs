@@ -20,6 +20,8 @@ const DENSE: f64 = 0.5;
 /// A mesh with the bound of its distance, where it has one.
 pub(super) struct Ended {
     pub(super) surface: Surface,
+    /// The mean stretch.
+    pub(super) mean: f64,
     pub(super) bound: Option<f64>,
     pub(super) counts: Counts,
 }
@@ -88,5 +90,5 @@ fn collapse_rules(rules: &Rules) -> CollapseRules {
 
 fn end(mut guarded: GuardedMesh<'_>, rules: &Rules) -> Ended {
     let (counts, bound) = (guarded.counts(), guarded.certified_distance(rules.promise));
-    Ended { surface: guarded.into_mesh().leave().surface, bound, counts }
+    Ended { mean: guarded.mean_stretch(), surface: guarded.into_mesh().leave().surface, bound, counts }
 }

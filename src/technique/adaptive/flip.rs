@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::ahead::scattered;
+use super::order::scattered;
 use super::smooth::worth;
 use super::work::{Care, Corners, Work, stretch};
 use crate::mesh::edit::{FlipPlan, check_flip, flip};
@@ -36,7 +36,15 @@ pub(super) enum Aim {
 impl Work<'_> {
     /// Flips all edges that gain.
     pub(super) fn flip_all(&mut self, aim: Aim) -> usize {
-        self.flip_from(self.awake_edges(), aim)
+        if aim != Aim::Worth {
+            return self.flip_from(self.awake_edges(), aim);
+        }
+        let mut quiet = std::mem::take(&mut self.quiet_edges);
+        let restless = quiet.restless(self.awake_edges(), |e| self.state(&self.near_edge(e)));
+        let done = self.flip_from(restless.iter().map(|&(e, _)| e).collect(), aim);
+        quiet.remember(&restless, |e| self.state(&self.near_edge(e)));
+        self.quiet_edges = quiet;
+        done
     }
 
     /// Flips edges of the faces round these vertices, and what lies next to the flips.

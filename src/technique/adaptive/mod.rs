@@ -33,6 +33,7 @@ mod certify;
 mod collapse;
 mod ending;
 mod flip;
+mod order;
 mod reference;
 mod smooth;
 mod split;
@@ -204,13 +205,10 @@ pub fn remesh(
     let mut report = Report::default();
     for gradation in STARTS {
         let mut work = Work::new(mesh.clone(), &reference, rules, gradation);
-        let best = work.attempts(&mut report, watch)?;
+        let ended = work.attempts(&mut report, |mesh| mend(&mesh.leave().surface, input, tree, rules, watch), watch)?;
         report.edits = report.edits + work.tally;
-        if let Some(best) = best {
-            let ended = mend(&best.leave().surface, input, tree, rules, watch)?;
-            if ended.bound.is_some() {
-                return Ok(report.ended(ended));
-            }
+        if let Some(ended) = ended {
+            return Ok(report.ended(ended));
         }
     }
     report.is_guarded_all_along = true;
@@ -228,10 +226,15 @@ impl Report {
 
 impl Work<'_> {
     /// Rounds of edits and certificates, with sizes that grow more slowly each time that the mean stretch stays below
-    /// the one asked for. Returns the best mesh for which a certificate has found nothing.
-    fn attempts(&mut self, report: &mut Report, watch: &Watch) -> Result<Option<HalfedgeMesh>, Cancelled> {
+    /// the one asked for. Returns the best of what `mend` makes of meshes for which a certificate has found nothing.
+    fn attempts(
+        &mut self,
+        report: &mut Report,
+        mend: impl Fn(HalfedgeMesh) -> Result<Ended, RemeshError>,
+        watch: &Watch,
+    ) -> Result<Option<Ended>, RemeshError> {
         let mut memos = Memos::default();
-        let mut best: Option<(f64, HalfedgeMesh)> = None;
+        let mut best: Option<Ended> = None;
         self.set_sizes();
         self.cut_up(watch)?;
         self.turn(ROUNDS[0], report, watch)?;
@@ -241,18 +244,17 @@ impl Work<'_> {
                 if !self.until_clean(&mut memos, report, watch)? {
                     break;
                 }
-                let mean = self.mean();
-                if best.as_ref().is_none_or(|(before, _)| mean > *before) {
-                    best = Some((mean, self.mesh.clone()));
-                }
-                let lacks = self.rules.mean_stretch - mean;
+                let ended = mend(self.mesh.clone())?;
+                let lacks = self.rules.mean_stretch - ended.mean;
+                let is_better = best.as_ref().is_none_or(|best| ended.mean > best.mean);
+                best = if is_better && ended.bound.is_some() { Some(ended) } else { best };
                 if lacks <= SLIGHTLY || !self.grow_slower(lacks) {
                     break;
                 }
             }
             self.turn(ROUNDS[1], report, watch)?;
         }
-        Ok(best.map(|(_, mesh)| mesh))
+        Ok(best)
     }
 
     /// Lets sizes grow more slowly for a mean stretch that lacks so much; whether they may.

@@ -6,7 +6,8 @@
 use glam::DVec3;
 use smallvec::SmallVec;
 
-use super::ahead::{Near, scattered};
+use super::ahead::Near;
+use super::order::scattered;
 use super::work::{Care, Corners, Faces, Work, stretch};
 use crate::mesh::edit::{relocate, slide};
 use crate::mesh::geometry::area_vector;
@@ -60,7 +61,7 @@ fn worth_at(p: DVec3, sides: &[[DVec3; 2]]) -> f64 {
 impl Work<'_> {
     /// Moves every vertex to the middle of its star.
     pub(super) fn smooth(&mut self) {
-        self.move_in_turn(Self::centred, Self::evened);
+        self.move_in_turn(self.awake_vertices(), Self::centred, Self::evened);
     }
 
     /// Puts vertices that lie off the reference back on it, at the cost of shapes: halves of edges that cut a corner
@@ -84,10 +85,10 @@ impl Work<'_> {
     /// Moves vertices to where one search or the other, for those on curves, says. Returns how many.
     fn move_in_turn(
         &mut self,
+        vertices: Vec<VertexId>,
         free: impl Fn(&Self, VertexId) -> Option<Place> + Sync,
         on_curve: impl Fn(&Self, VertexId) -> Option<Place> + Sync,
     ) -> usize {
-        let vertices = scattered(self.awake_vertices());
         let look = |work: &Self, v: VertexId| match work.mesh.vertex_freedom(v) {
             Freedom::Free if !work.mesh.is_boundary_vertex(v) => free(work, v),
             Freedom::OnCurve => on_curve(work, v),
@@ -95,7 +96,7 @@ impl Work<'_> {
         };
         let mut moved = 0;
         let near = |_: &Self, v: VertexId| Near::from_slice(&[v]);
-        self.in_turn(&vertices, near, look, |work, v, place| moved += usize::from(work.go_to(v, place)));
+        self.in_turn(&scattered(vertices), near, look, |work, v, place| moved += usize::from(work.go_to(v, place)));
         moved
     }
 
@@ -184,7 +185,13 @@ impl Work<'_> {
 
     /// Moves every vertex to where the faces round it are worth most. Returns how many moved.
     pub(super) fn improve(&mut self) -> usize {
-        self.move_in_turn(Self::better_place, Self::better_place_on_curve)
+        let mut quiet = std::mem::take(&mut self.quiet_vertices);
+        let restless = quiet.restless(self.awake_vertices(), |v| self.state(&[v]));
+        let vertices = restless.iter().map(|&(v, _)| v).collect();
+        let moved = self.move_in_turn(vertices, Self::better_place, Self::better_place_on_curve);
+        quiet.remember(&restless, |v| self.state(&[v]));
+        self.quiet_vertices = quiet;
+        moved
     }
 
     fn sides_round(&self, v: VertexId) -> Sides {

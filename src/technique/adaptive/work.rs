@@ -4,6 +4,7 @@ use glam::DVec3;
 use smallvec::SmallVec;
 
 use super::Rules;
+use super::order::Quiet;
 use super::reference::{Foot, Reference};
 use crate::mesh::geometry::{angle, area_vector, centroid};
 use crate::mesh::halfedge::{HalfedgeMesh, edge_of};
@@ -66,6 +67,9 @@ pub(super) struct Work<'a> {
     /// Vertices that hold a place of the reference that would be lost else.
     pub(super) pinned: Vec<bool>,
     pub(super) care: Care,
+    /// Vertices that have no better place, and edges no better diagonal.
+    pub(super) quiet_vertices: Quiet,
+    pub(super) quiet_edges: Quiet,
     pub(super) tally: Counts,
 }
 
@@ -87,6 +91,8 @@ impl<'a> Work<'a> {
             awake: vec![true; slots],
             pinned: vec![false; slots],
             care: Care::Sizes,
+            quiet_vertices: Quiet::default(),
+            quiet_edges: Quiet::default(),
             tally: Counts::default(),
             mesh,
             reference,
