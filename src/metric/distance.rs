@@ -390,7 +390,7 @@ fn decide_parts(
 }
 
 /// The part of the diagonal below which distances from outside parts are not told apart.
-const FINEST: f64 = 1e-4;
+const FINEST: f64 = 1e-3;
 
 /// A certified bound of the largest distance from those parts of one mesh that are not inside of another one's bodies;
 /// `None` where one has no triangle.

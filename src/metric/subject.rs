@@ -18,6 +18,9 @@ use crate::mesh::geometry::{Aabb, triangle_area};
 use crate::mesh::{FaceId, Facet, Soup};
 use crate::watch::Watch;
 
+/// Where no part of the reference lies farther off than this part of its diagonal, none is taken for hidden.
+const NOTHING_HIDDEN: f64 = 0.005;
+
 /// A mesh under measurement.
 pub struct Subject<'a> {
     mesh: &'a Soup,
@@ -125,9 +128,14 @@ impl<'a> Subject<'a> {
     }
 
     /// A certified upper bound of the distance from those parts of the reference that are not inside of the mesh's
-    /// bodies. Absent as [`Self::distance`] is.
+    /// bodies: that of all parts where it is small, since then nothing hidden lies far away, and to look for what is
+    /// hidden costs many times more. Absent as [`Self::distance`] is.
     pub fn outer_bound(&self) -> Option<f64> {
         let reference = self.reference()?;
+        let of_all = self.bound(true)?;
+        if of_all <= NOTHING_HIDDEN * reference.target().bvh().bounds().diagonal() {
+            return Some(of_all);
+        }
         let hidden = distance::Inside::of(self.mesh);
         distance::outside_bound(reference.target(), self.target(), &hidden, self.watch).ok().flatten()
     }

@@ -1,11 +1,11 @@
 //! A surface that runs through itself, cut where it does, and what bounds its solid.
 //!
 //! # Algorithm
-//! 1. Corners of faces that meet others go to a grid of integers ([`snap`]).
-//! 2. Every two of these faces get the points and segments that they have in common ([`meet`]), decided and kept
-//!    exactly ([`exact`], on integers of fixed width, [`wide`]).
-//! 3. Each face is cut along its segments, faces that lie on each other together ([`flat`], [`triangulate`]).
-//! 4. The pieces bound cells of space, each with a winding number ([`cells`]). Bodies are where it is at least one: the
+//! 1. Corners of faces that meet others go to a grid of integers (`snap`).
+//! 2. Every two of these faces get the points and segments that they have in common (`meet`), decided and kept
+//!    exactly (`exact`, on integers of fixed width, `wide`).
+//! 3. Each face is cut along its segments, faces that lie on each other together (`flat`, `triangulate`).
+//! 4. The pieces bound cells of space, each with a winding number (`cells`). Bodies are where it is at least one: the
 //!    pieces between inside and outside stay, looking outward, and the others go. Sheets, which have a border, stay as
 //!    they are, cut along where they pass through others.
 //! 5. Points are rounded to floats, which may let pieces meet again: the caller finds out and goes on with a coarser
