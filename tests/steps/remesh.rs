@@ -125,6 +125,17 @@ fn scale_by_powers_of_two_and_mirrors_change_nothing_that_counts() {
 }
 
 #[test]
+fn small_parts_reach_the_mean_and_keep_far_from_needles() {
+    let floors = [("cube", shapes::cube(), "15%", 0.55, 0.885), ("washer", shapes::washer(32), "10%", 0.5, 0.87)];
+    for (name, mesh, size, least, mean) in floors {
+        let made = run("remesh", &format!("max-size = \"{size}\""), &marked(&mesh));
+        let of = |figure: &str| made.stats[figure].as_f64().unwrap();
+        assert!(of("min-stretch") >= least, "{name}: {}", of("min-stretch"));
+        assert!(of("mean-stretch") >= mean, "{name}: {}", of("mean-stretch"));
+    }
+}
+
+#[test]
 fn any_number_of_threads_makes_the_same_mesh() {
     let before = marked(&shapes::torus(48, 24));
     let made = |threads: usize| {
