@@ -40,6 +40,8 @@ pub struct Meetings {
     pub pairs: Vec<(u32, u32, Meeting)>,
     /// Whether these are all; else there are at least as many.
     pub complete: bool,
+    /// Triangles with the same three corners, where there are several; such are no pairs.
+    pub copies: Vec<Vec<u32>>,
 }
 
 /// The pairs that `test` calls an intersection. The test must not depend on the order of triangles or of their corners,
@@ -81,7 +83,7 @@ pub fn meetings(
         search.finder.expand(a, b, &mut |i, j| pairs.push((i, j, meeting)));
     }
     pairs.sort_unstable();
-    Ok(Meetings { pairs, complete: true })
+    Ok(Meetings { pairs, complete: true, copies: search.finder.into_copies() })
 }
 
 struct Search<'a, F> {
@@ -138,7 +140,7 @@ impl<F: Fn(Triangle, Triangle) -> Meeting> Search<'_, F> {
             }
         }
         pairs.sort_unstable();
-        Ok(Meetings { pairs, complete: false })
+        Ok(Meetings { pairs, complete: false, copies: Vec::new() })
     }
 }
 

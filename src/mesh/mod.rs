@@ -3,6 +3,7 @@
 pub mod bvh;
 pub mod carried;
 pub mod classes;
+pub mod contact;
 pub mod edit;
 pub mod freedom;
 pub mod geometry;

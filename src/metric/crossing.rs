@@ -16,7 +16,7 @@ use super::intersection::triangulated;
 use crate::mesh::FaceId;
 use crate::mesh::bvh::TriangleBvh;
 use crate::mesh::geometry::{area_vector, closest_on_triangle};
-use crate::mesh::predicate::triangle_triangle;
+use crate::mesh::predicate::{Meeting, triangle_triangle};
 
 /// How far from the reference's crossings others may lie, as a share of its diagonal: surfaces that cross at a small
 /// angle, each moved by a fifth of a percent, cross elsewhere by several times that.
@@ -44,9 +44,18 @@ impl Crossings {
     }
 }
 
-/// Compares crossings by place and length; O((n + m) log m) in pairs of the mesh and of the reference.
+/// Compares all that meets by place and length; O((n + m) log m) in pairs of the mesh and of the reference.
 pub fn compare(subject: &Subject<'_>, reference: &Subject<'_>) -> Crossings {
-    let (ours, theirs) = (places(subject), places(reference));
+    compare_places(&places(subject, false), reference)
+}
+
+/// Compares what does not only touch with all that meets in the reference.
+pub fn compare_crossing(subject: &Subject<'_>, reference: &Subject<'_>) -> Crossings {
+    compare_places(&places(subject, true), reference)
+}
+
+fn compare_places(ours: &[Place], reference: &Subject<'_>) -> Crossings {
+    let theirs = places(reference, false);
     let apart = APART * reference.extent().bounds.diagonal();
     let old = TriangleBvh::new(theirs.iter().flat_map(|place| place.common.fan()).collect());
     let is_old = |&p: &DVec3| old.closest_within(p, apart * apart).is_some();
@@ -56,7 +65,7 @@ pub fn compare(subject: &Subject<'_>, reference: &Subject<'_>) -> Crossings {
     elsewhere.dedup();
     let sum = |places: &[Place]| places.iter().map(|place| place.common.length()).sum::<f64>();
     let reference_length = sum(&theirs);
-    Crossings { elsewhere, length: sum(&ours), reference_length, longest: LONGER * reference_length + apart }
+    Crossings { elsewhere, length: sum(ours), reference_length, longest: LONGER * reference_length + apart }
 }
 
 /// What two triangles that meet have in common.
@@ -117,7 +126,7 @@ struct Place {
     common: Common,
 }
 
-fn places(subject: &Subject<'_>) -> Vec<Place> {
+fn places(subject: &Subject<'_>, only_crossing: bool) -> Vec<Place> {
     let mesh = subject.mesh();
     let cut = triangulated(mesh);
     let coordinates = cut.coordinates(mesh);
@@ -127,7 +136,8 @@ fn places(subject: &Subject<'_>) -> Vec<Place> {
         &coordinates[first..end]
     };
     let mut found = Vec::new();
-    for &(a, b, _) in &subject.intersections().pairs {
+    for &(a, b, _) in subject.intersections().pairs.iter().filter(|pair| !only_crossing || pair.2 != Meeting::Touching)
+    {
         for &ours in triangles(a) {
             for &theirs in triangles(b) {
                 if triangle_triangle(ours, theirs).is_intersection() {

@@ -1,11 +1,13 @@
 //! Self-intersections: which faces meet where they should not, decided exactly.
 //!
 //! Quads are cut on the shorter diagonal. Two faces count when they meet outside the corners and the edge that they
-//! share, where corners with equal coordinates are shared. Faces without area and duplicates are left to their own
-//! metrics. Counting stops at [`MOST`] pairs, or where too many boxes overlap to look at each two; the answer says so.
+//! share, where corners with equal coordinates are shared; those that only touch are told from those that run through
+//! each other by what lies round them ([`contact`](crate::mesh::contact)). Faces without area are left to their own
+//! metric. Counting stops at [`MOST`] pairs, or where too many boxes overlap to look at each two; the answer says so.
 
 use glam::DVec3;
 
+use crate::mesh::contact::tell_contacts;
 pub use crate::mesh::meetings::MOST;
 use crate::mesh::meetings::meetings;
 use crate::mesh::predicate::{Meeting, triangle_triangle};
@@ -58,27 +60,55 @@ pub fn triangulated(mesh: &Soup) -> Triangulated {
 /// Pairs of faces that intersect.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Intersections {
-    /// The pairs, the smaller id first, in order, and how they meet.
+    /// The pairs, the smaller id first, in order, and how they meet: `Touching` where the surfaces only touch there,
+    /// else they run through each other or overlap.
     pub pairs: Vec<(FaceId, FaceId, Meeting)>,
     /// Whether these are all; else there are at least as many.
     pub complete: bool,
+    /// Pairs of faces with the same corners; they are not among the others.
+    pub coincident: u64,
+}
+
+impl Intersections {
+    /// The pairs that run through each other or overlap, as if a surface had two sides on one.
+    pub fn crossing(&self) -> impl Iterator<Item = &(FaceId, FaceId, Meeting)> {
+        self.pairs.iter().filter(|pair| pair.2 != Meeting::Touching)
+    }
+
+    /// How many pairs only touch, or have the same corners.
+    pub fn contacts(&self) -> u64 {
+        self.coincident + (self.pairs.len() - self.crossing().count()) as u64
+    }
 }
 
 /// Pairs of faces that intersect.
 pub fn self_intersections(mesh: &Soup, watch: &Watch) -> Result<Intersections, Cancelled> {
     let cut = triangulated(mesh);
-    let found = meetings(&cut.coordinates(mesh), triangle_triangle, watch)?;
+    let mut found = meetings(&cut.coordinates(mesh), triangle_triangle, watch)?;
+    tell_contacts(&cut.corners, |v| mesh.points[v], &mut found.pairs);
     let of = |(i, j, meeting): (u32, u32, Meeting)| (cut.origin[i as usize], cut.origin[j as usize], meeting);
     let mut pairs: Vec<_> = found.pairs.into_iter().map(of).filter(|(a, b, _)| a != b).collect();
-    pairs.sort_unstable();
-    // The two halves of a quad may meet the same face.
+    // The two halves of a quad may meet the same face: what is more than a touch comes first.
+    pairs.sort_unstable_by_key(|&(a, b, meeting)| (a, b, std::cmp::Reverse(meeting)));
     pairs.dedup_by_key(|p| (p.0, p.1));
-    Ok(Intersections { pairs, complete: found.complete })
+    let coincident = coincident(mesh, &cut, &found.copies);
+    Ok(Intersections { pairs, complete: found.complete, coincident })
+}
+
+/// Pairs of faces with the same corners; of quads each half stands for half a pair.
+fn coincident(mesh: &Soup, cut: &Triangulated, copies: &[Vec<u32>]) -> u64 {
+    let halves = |same: &Vec<u32>| {
+        let is_whole = |&&t: &&u32| matches!(mesh.faces[cut.origin[t as usize]], Facet::Tri(_));
+        let whole = same.iter().filter(is_whole).count() as u64;
+        let half = same.len() as u64 - whole;
+        whole * whole.saturating_sub(1) + half * half.saturating_sub(1) / 2 + 2 * whole * half
+    };
+    copies.iter().map(halves).sum::<u64>() / 2
 }
 
 /// The faces of these pairs, in order.
-pub fn faces_of(pairs: &[(FaceId, FaceId, Meeting)]) -> Vec<FaceId> {
-    let mut faces: Vec<FaceId> = pairs.iter().flat_map(|&(a, b, _)| [a, b]).collect();
+pub fn faces_of<'a>(pairs: impl IntoIterator<Item = &'a (FaceId, FaceId, Meeting)>) -> Vec<FaceId> {
+    let mut faces: Vec<FaceId> = pairs.into_iter().flat_map(|&(a, b, _)| [a, b]).collect();
     faces.sort_unstable();
     faces.dedup();
     faces

@@ -79,7 +79,7 @@ pub struct Step;
 
 impl StepContract for Step {
     const NAME: &'static str = "measure";
-    const REVISION: u32 = 4;
+    const REVISION: u32 = 5;
     const INPUTS: &'static [InputDef] = &[
         InputDef {
             name: "from",

@@ -110,6 +110,11 @@ impl Finder {
         self.copies[a as usize].len() as u64 * self.copies[b as usize].len() as u64
     }
 
+    /// The triangles with the same corners, where there are several.
+    pub(super) fn into_copies(self) -> Vec<Vec<u32>> {
+        self.copies.into_iter().filter(|same| same.len() > 1).collect()
+    }
+
     /// Calls `add` with these pairs, the lower triangle first.
     pub(super) fn expand(&self, a: u32, b: u32, add: &mut dyn FnMut(u32, u32)) {
         for &i in &self.copies[a as usize] {

@@ -106,7 +106,8 @@ fn many_triangles_at_one_place_cost_little() {
         (at_corner(count), count * count / 100),
     ] {
         assert!(candidates(&triangles) < most, "{}", candidates(&triangles));
-        assert_eq!(found(&triangles), Meetings { pairs: Vec::new(), complete: true });
+        let found = found(&triangles);
+        assert!(found.pairs.is_empty() && found.complete);
     }
 }
 
@@ -121,5 +122,5 @@ fn looking_stops_where_the_answer_is_quadratic() {
     let stacked: Vec<Triangle> = (0..8000)
         .map(|i| [DVec3::ZERO, dvec3(1.0, 0.0, 1.0), dvec3(0.0, 1.0, 1.0)].map(|p| p + DVec3::Z * (i as f64 / 1e5)))
         .collect();
-    assert_eq!(found(&stacked), Meetings { pairs: Vec::new(), complete: false });
+    assert_eq!(found(&stacked), Meetings::default());
 }

@@ -1,6 +1,6 @@
 //! Judging a mesh by the checks of a gate.
 
-use super::super::crossing::compare;
+use super::super::crossing::compare_crossing;
 use super::super::distance::{Decision, Inside, decide, decide_outside};
 use super::super::number::number_text;
 use super::super::registry::{MetricDef, Needs, Unit, find, lost_groups};
@@ -250,7 +250,7 @@ fn by_place(subject: &Subject<'_>, mut out: GateRow) -> GateRow {
     if out.passed || !complete || reference.intersections().pairs.is_empty() {
         return out;
     }
-    let found = compare(subject, reference);
+    let found = compare_crossing(subject, reference);
     let lengths =
         format!("{} long, {} in the reference", number_text(found.length), number_text(found.reference_length));
     if found.is_old() {

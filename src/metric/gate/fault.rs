@@ -8,6 +8,7 @@ use super::super::registry::{LOW_SCALED_JACOBIAN, LOW_STRETCH};
 use super::super::shape::angle_of_stretch;
 use super::column::fault_at;
 use super::{Cause, Fault, FaultKind};
+use crate::mesh::predicate::Meeting;
 use crate::mesh::{EdgeKey, FaceId, Facet, Soup, VertexId, edge_key, geometry};
 
 /// The elements at fault for a count, a share or a property of the whole mesh; empty where there are none to name.
@@ -39,7 +40,11 @@ pub(super) fn of_whole(subject: &Subject<'_>, name: &str) -> Vec<Fault> {
         "duplicate-faces" => faces(topology.duplicates.clone()),
         "repeated-vertex-faces" => faces(topology.repeated.clone()),
         "degenerate-faces" => faces(subject.degenerate()),
-        "self-intersections" | "self-intersecting-faces" => faces(faces_of(&subject.intersections().pairs)),
+        "self-intersections" | "self-intersecting-faces" => faces(faces_of(subject.intersections().crossing())),
+        "contacts" => {
+            let pairs = subject.intersections().pairs.iter();
+            faces(faces_of(pairs.filter(|pair| pair.2 == Meeting::Touching)))
+        }
         "irregular-vertices" | "irregular-share" => {
             vertices(&mut subject.inner_and_irregular().1.into_iter().map(|v| v as u32))
         }

@@ -113,8 +113,8 @@ pub(super) static METRICS: &[MetricDef] = &[
         Count,
         Lower,
         Mesh,
-        "Faces that meet another one outside what they share, decided exactly; quads cut on the shorter diagonal.",
-        |s| crossings(s, faces_of(&s.intersections().pairs).len()),
+        "Faces that run through another one or lie on it, decided exactly; quads cut on the shorter diagonal.",
+        |s| crossings(s, faces_of(s.intersections().crossing()).len()),
     ),
     metric(
         "self-intersections",
@@ -122,7 +122,15 @@ pub(super) static METRICS: &[MetricDef] = &[
         Lower,
         Mesh,
         "Pairs of such faces; counting stops at a million, or where too many boxes overlap, and says so with ≥.",
-        |s| crossings(s, s.intersections().pairs.len()),
+        |s| crossings(s, s.intersections().crossing().count()),
+    ),
+    metric(
+        "contacts",
+        Count,
+        Lower,
+        Mesh,
+        "Pairs of faces that only touch outside what they share, or lie against each other as touching bodies do.",
+        |s| crossings(s, s.intersections().contacts() as usize),
     ),
     metric("area", Area, Neutral, Mesh, "Sum of face areas; a quad is the mean of its two cuts.", |s| {
         number(Some(s.extent().area))

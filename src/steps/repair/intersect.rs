@@ -7,9 +7,10 @@ use glam::DVec3;
 
 use super::draft::normal;
 use super::report::RepairError;
-use crate::mesh::FaceId;
+use crate::mesh::contact::tell_contacts;
 use crate::mesh::meetings::meetings;
 use crate::mesh::predicate::{Meeting, triangle_triangle};
+use crate::mesh::{FaceId, Surface};
 use crate::metric::crossing::Common;
 use crate::watch::{Cancelled, Watch};
 
@@ -30,6 +31,13 @@ pub(super) struct Intersections {
 }
 
 impl Intersections {
+    /// How many of the pairs only touch.
+    pub(super) fn contacts(&self, surface: &Surface) -> u64 {
+        let mut met = self.met.clone();
+        tell_contacts(surface.faces.as_slice(), |v| surface.points[v], &mut met);
+        met.iter().filter(|pair| pair.2 == Meeting::Touching).count() as u64
+    }
+
     /// Refuses faces that run through each other along more than `longest` in all. Faces that lie on each other count
     /// with the area that they share, over `diagonal`, so that the sum does not depend on how finely they are cut.
     pub(super) fn check_length(

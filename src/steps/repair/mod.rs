@@ -353,6 +353,7 @@ fn count_intersections(
     let before = before.as_ref().unwrap_or(&after);
     stats.self_intersections_before = before.pairs;
     stats.counting_stopped = !(before.complete && after.complete);
+    stats.contacts = after.contacts(surface);
     (stats.self_intersections, stats.self_intersecting_faces) = (after.pairs, after.faces);
     Ok(())
 }

@@ -80,6 +80,9 @@ pub struct RepairStats {
     pub self_intersections_before: u64,
     /// Pairs of faces that run through or touch each other in the result.
     pub self_intersections: u64,
+    /// Those among these pairs that only touch, or lie against each other as touching bodies do.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub contacts: u64,
     /// Whether there were more pairs than are counted, so that the counts are lower bounds.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub counting_stopped: bool,
@@ -93,6 +96,11 @@ pub struct RepairStats {
     /// Borders that lie beside each other and are not joined; a run says it.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub warnings: Vec<String>,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes references")]
+fn is_zero(number: &u64) -> bool {
+    *number == 0
 }
 
 impl RepairStats {
