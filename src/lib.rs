@@ -8,6 +8,7 @@
 //! | hold and walk them | [`mesh`]: [`mesh::Soup`] as it came, [`mesh::Surface`] after repair |
 //! | call one step as a function | [`steps`], such as [`steps::repair`]; what steps have in common is in [`step`] |
 //! | measure | [`metric`] |
+//! | judge elements by a standard | [`metric::gate::criteria`], read by [`criteria`] |
 //! | run a whole recipe | [`recipe`] to [`plan`](mod@plan) to [`run`](mod@run) with a [`store`], then [`report`] |
 //! | see progress, and cancel | [`watch`] |
 //!
@@ -29,6 +30,7 @@
 
 #[doc(hidden)]
 pub mod cli;
+pub mod criteria;
 pub mod format;
 pub mod mesh;
 pub mod metric;

@@ -4,6 +4,7 @@
 //! expression, a string that begins with `=`. A step table without `use` is taken as it is: it changes a step of an
 //! extended recipe, and which one only the loader knows.
 
+mod criteria;
 mod nested;
 mod reference;
 mod sweep;
@@ -14,6 +15,7 @@ use schemars::SchemaGenerator;
 use schemars::generate::SchemaSettings;
 use serde_json::{Map, Value, json};
 
+pub use criteria::{criteria_schema, criteria_schema_text};
 pub use nested::{NestedKey, NestedTable, nested_tables};
 pub use reference::{kind, steps_reference};
 
@@ -43,6 +45,8 @@ pub fn recipe_schema(catalog: &[StepDef], endings: &[&str]) -> Value {
         definitions.insert(name.to_owned(), check(&limit));
     }
     definitions.insert("Gate".to_owned(), gate());
+    definitions.insert("Criteria".to_owned(), criteria::section());
+    definitions.extend(criteria::definitions().map(|(name, schema)| (name.to_owned(), schema)));
     definitions.insert("Output".to_owned(), output(endings));
     json!({
         "$schema": "http://json-schema.org/draft-07/schema#",
@@ -79,6 +83,11 @@ pub fn recipe_schema(catalog: &[StepDef], endings: &[&str]) -> Value {
                 "type": "object",
                 "description": "By step, what its mesh must hold.",
                 "additionalProperties": { "$ref": "#/definitions/Gate" }
+            },
+            "criteria": {
+                "type": "object",
+                "description": "Standards for elements by name; a gate names one with `criteria`.",
+                "additionalProperties": { "$ref": "#/definitions/Criteria" }
             },
             "outputs": {
                 "type": "object",
@@ -251,7 +260,8 @@ fn gate() -> Value {
         });
         (metric.name.to_owned(), schema)
     };
-    let properties: Map<String, Value> = METRICS.iter().map(property).collect();
+    let mut properties: Map<String, Value> = METRICS.iter().map(property).collect();
+    properties.insert("criteria".to_owned(), criteria::of_gate());
     json!({ "type": "object", "properties": properties, "additionalProperties": false })
 }
 

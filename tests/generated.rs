@@ -6,10 +6,13 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use meshmill::criteria::{LEVEL_KEYS, OWN_KEYS};
 use meshmill::format::Format;
-use meshmill::plan::{CHECK_KEYS, ELEMENTS, METRIC_ENDINGS, OUTPUT_KEYS};
+use meshmill::plan::{CHECK_KEYS, CRITERIA_KEYS, ELEMENTS, METRIC_ENDINGS, OUTPUT_KEYS};
 use meshmill::report::json;
-use meshmill::schema::{nested_tables, recipe_schema, recipe_schema_text, steps_reference};
+use meshmill::schema::{
+    criteria_schema, criteria_schema_text, nested_tables, recipe_schema, recipe_schema_text, steps_reference,
+};
 use meshmill::step::parameters::ParameterSchema;
 use meshmill::steps::CATALOG;
 use serde_json::Value;
@@ -41,6 +44,29 @@ fn schema_is_up_to_date() {
 fn the_schema_of_what_is_printed_is_up_to_date() {
     assert!(jsonschema::draft7::meta::is_valid(&json::schema()));
     compare("schemas/output.schema.json", &json::schema_text());
+}
+
+#[test]
+fn the_schema_of_criteria_is_up_to_date_and_shipped_criteria_agree_with_it() {
+    let schema = criteria_schema();
+    assert!(jsonschema::draft7::meta::is_valid(&schema));
+    compare("schemas/criteria.schema.json", &criteria_schema_text());
+    let validator = jsonschema::draft7::new(&schema).unwrap();
+    let files = recipes("pipelines/criteria");
+    assert_eq!(files.len(), 3);
+    for file in files {
+        let criteria: Value = toml::from_str(&fs::read_to_string(&file).unwrap()).unwrap();
+        let faults: Vec<String> = validator.iter_errors(&criteria).map(|error| error.to_string()).collect();
+        assert_eq!(faults, [""; 0], "{}", file.display());
+    }
+    let keys: BTreeSet<&str> = schema["properties"].as_object().unwrap().keys().map(String::as_str).collect();
+    assert!(OWN_KEYS.iter().filter(|key| **key != "file").all(|key| keys.contains(key)));
+    let levels = schema.pointer("/definitions/NumberCriterion/anyOf/1/properties").and_then(Value::as_object).unwrap();
+    assert_eq!(levels.keys().map(String::as_str).collect::<BTreeSet<_>>(), BTreeSet::from(LEVEL_KEYS));
+    let recipe = recipe_schema(CATALOG, &endings());
+    let of_gate = recipe.pointer("/definitions/Gate/properties/criteria/anyOf/0/anyOf/1/properties").unwrap();
+    let of_gate: BTreeSet<&str> = of_gate.as_object().unwrap().keys().map(String::as_str).collect();
+    assert_eq!(of_gate, BTreeSet::from(CRITERIA_KEYS));
 }
 
 #[test]

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 use std::fs;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -11,7 +12,7 @@ use super::Global;
 use super::exit::{Exit, Fault};
 use crate::format::Format;
 use crate::plan::{self, CaseSpec, ColumnRequest, Context, Plan};
-use crate::recipe::{Overrides, Recipe, suggest};
+use crate::recipe::{LARGEST, Overrides, Recipe, suggest};
 use crate::run::{self, RunError};
 use crate::step::failure::without_code;
 use crate::steps::CATALOG;
@@ -91,13 +92,21 @@ impl RecipeArguments {
     }
 }
 
-/// The text of a recipe, or why it cannot be read.
+/// The text of a recipe or of criteria, or why it cannot be read. Of a file that is longer than any of them only so
+/// much that whoever looks at it sees that; it may have no end.
 pub(super) fn read_text(path: &Path) -> Result<String, String> {
-    fs::read_to_string(path).map_err(|error| match error.kind() {
+    let system = |error: std::io::Error| match error.kind() {
         std::io::ErrorKind::NotFound => "there is no such file".to_owned(),
-        std::io::ErrorKind::InvalidData => "it is no text; a recipe is a TOML file".to_owned(),
         _ => without_code(&error.to_string()),
-    })
+    };
+    let mut bytes = Vec::new();
+    let most = LARGEST as u64 + 1;
+    fs::File::open(path).and_then(|file| file.take(most).read_to_end(&mut bytes)).map_err(system)?;
+    match String::from_utf8(bytes) {
+        Ok(text) => Ok(text),
+        Err(error) if error.as_bytes().len() > LARGEST => Ok(String::from_utf8_lossy(error.as_bytes()).into_owned()),
+        Err(_) => Err("it is no text; a recipe is a TOML file".to_owned()),
+    }
 }
 
 /// Plans cases of a recipe over the steps that there are.

@@ -9,6 +9,7 @@ mod check;
 mod completions;
 mod context;
 mod convert;
+mod criteria;
 mod diff;
 mod exit;
 mod goal;
@@ -86,6 +87,7 @@ enum Command {
     Report(report::Arguments),
     Measure(measure::Arguments),
     Convert(convert::Arguments),
+    Criteria(criteria::Arguments),
     Diff(diff::Arguments),
     Steps(steps::Arguments),
     Schema(schema::Arguments),
@@ -120,6 +122,7 @@ pub fn main() -> ExitCode {
         Command::Report(command) => report::run(command, global),
         Command::Measure(command) => measure::run(command),
         Command::Convert(command) => convert::run(command),
+        Command::Criteria(command) => criteria::run(command),
         Command::Diff(command) => diff::run(command),
         Command::Steps(command) => steps::run(command),
         Command::Schema(command) => schema::run(command),

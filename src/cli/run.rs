@@ -18,7 +18,7 @@ use super::trace::Trace;
 use super::unchanged::Unchanged;
 use crate::plan::in_case;
 use crate::report::json::Kind;
-use crate::report::{Report, Status, StepReport, record, table};
+use crate::report::{Report, Status, StepReport, junit, record, table};
 use crate::run::{self, Observer, RunError, RunOptions, RunOutcome};
 use crate::store::Store;
 use crate::store::stamp::Said;
@@ -46,6 +46,9 @@ pub(super) struct Arguments {
     /// Print the report as one JSON document.
     #[arg(long)]
     json: bool,
+    /// Write the checks as JUnit XML too, for systems of continuous integration: a test for each check and criterion.
+    #[arg(long, value_name = "FILE")]
+    junit: Option<PathBuf>,
     /// Which outputs get a picture beside them: all where there are few of them, all, or none.
     #[arg(long, value_name = "WHICH", value_enum, default_value_t)]
     pictures: Pictures,
@@ -77,9 +80,11 @@ pub(super) fn once(arguments: &Arguments, global: &Global, interrupt: &Interrupt
     if let Some(lock) = arguments.locked.as_ref().filter(|lock| !lock.is_empty()) {
         options.protected.push(PathBuf::from(lock));
     }
-    if let Some(file) = &arguments.trace {
+    for file in [&arguments.trace, &arguments.junit].into_iter().flatten() {
         planned.check_replaces(file, &options.protected)?;
     }
+    // No output takes its place.
+    options.protected.extend(arguments.junit.clone());
     let _claim = run::claim(&options.out)?;
     options.only.clone_from(&arguments.only);
     options.force.clone_from(&arguments.force);
@@ -91,6 +96,9 @@ pub(super) fn once(arguments: &Arguments, global: &Global, interrupt: &Interrupt
     tell(&report, arguments.json, global.quiet)?;
     if cancelled {
         return Ok(interrupt.exit());
+    }
+    if let Some(file) = &arguments.junit {
+        run::write_named(file, junit::document(&report).as_bytes())?;
     }
     if arguments.report {
         report::write(&report, None, &store, &[], &options.out.join("report.html"))?;
@@ -110,8 +118,8 @@ pub(super) fn once(arguments: &Arguments, global: &Global, interrupt: &Interrupt
 impl Arguments {
     /// The short cut for this run; none where more is asked for than that everything is up to date.
     fn unchanged(&self, global: &Global) -> Option<Unchanged> {
-        let plain =
-            self.force.is_empty() && !self.json && !self.report && self.trace.is_none() && self.locked.is_none();
+        let files = self.trace.is_none() && self.junit.is_none();
+        let plain = self.force.is_empty() && !self.json && !self.report && files && self.locked.is_none();
         let mut more = vec![("--out", path_bytes(self.out.as_deref())), ("--pictures", vec![self.pictures as u8])];
         more.extend(self.only.iter().map(|step| ("--only", step.as_bytes().to_vec())));
         (plain && global.verbose == 0).then(|| Unchanged::of("run", &self.recipe, &more, global))

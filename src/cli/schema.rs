@@ -3,10 +3,10 @@
 use super::context::endings;
 use super::exit::{Exit, Fault, data};
 use crate::report::json;
-use crate::schema::recipe_schema_text;
+use crate::schema::{criteria_schema_text, recipe_schema_text};
 use crate::steps::CATALOG;
 
-/// Print a JSON Schema: of recipes, for editors, or of what `--json` prints.
+/// Print a JSON Schema: of recipes or files of criteria, for editors, or of what `--json` prints.
 #[derive(Debug, clap::Args)]
 pub(super) struct Arguments {
     /// Which one.
@@ -19,6 +19,8 @@ enum Of {
     /// Recipes.
     #[default]
     Recipe,
+    /// Files of criteria.
+    Criteria,
     /// What `run`, `measure`, `diff` and `sweep` print with `--json`.
     Output,
 }
@@ -27,6 +29,7 @@ enum Of {
 pub(super) fn run(arguments: &Arguments) -> Result<Exit, Fault> {
     let text = match arguments.of {
         Of::Recipe => recipe_schema_text(CATALOG, &endings()),
+        Of::Criteria => criteria_schema_text(),
         Of::Output => json::schema_text(),
     };
     data(text.trim_end());

@@ -7,6 +7,7 @@
 use serde::{Deserialize, Serialize};
 
 mod column;
+pub mod criteria;
 mod evaluate;
 mod fault;
 
@@ -114,8 +115,11 @@ pub struct GateRow {
 /// The outcome of all checks of a gate.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct GateReport {
-    /// One row a check, in order.
+    /// One row a check, in order; of criteria, one row for all of them.
     pub rows: Vec<GateRow>,
+    /// What stands behind the row of criteria.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub criteria: Option<criteria::CriteriaReport>,
 }
 
 impl GateReport {

@@ -2,6 +2,7 @@
 
 pub mod crossing;
 pub mod distance;
+pub mod element;
 pub mod feature;
 pub mod gate;
 pub mod intersection;

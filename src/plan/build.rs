@@ -7,7 +7,7 @@ use std::sync::Arc;
 use super::bind::{BoundDecl, bind};
 use super::case::{CaseContext, CaseSpec, Context};
 use super::columns::{ColumnDecl, ColumnRequest, Columns, result};
-use super::gates::{GateDecl, gates};
+use super::gates::{GateDecl, Group, gates};
 use super::merge::PlanBuilder;
 use super::outputs::{OutputDecl, outputs};
 use super::task::{GateTask, StepTask, TaskId};
@@ -118,7 +118,7 @@ impl<'a, 'r> Nodes<'a, 'r> {
         let gated = parts
             .gates
             .iter()
-            .flat_map(|gate| gate.groups.iter().filter_map(|(reference, _)| *reference).chain([gate.target]));
+            .flat_map(|gate| gate.groups.iter().filter_map(|group| group.reference).chain([gate.target]));
         let measured = parts.columns.iter().flat_map(|column| column.reference.into_iter().chain([column.target]));
         let written = parts.outputs.iter().flat_map(|output| output.producer.into_iter().chain(output.midside_on));
         let mut used: BTreeSet<(usize, &'static str)> = links
@@ -225,17 +225,18 @@ impl<'a, 'r> Nodes<'a, 'r> {
     fn gate(&self, gate: GateDecl, builder: &mut PlanBuilder) -> Option<Gate> {
         let target = self.id(gate.target)?;
         let mut tasks = Vec::new();
-        for (reference, checks) in gate.groups {
+        for Group { reference, task } in gate.groups {
             let mut inputs = vec![("target", target)];
             inputs.extend(reference.and_then(|reference| self.id(reference)).map(|id| ("reference", id)));
-            let label = match reference {
-                Some(reference) => {
-                    let other = label(&self.steps[reference.step].decl.name, reference.output.name);
-                    format!("gate {} to {other}", gate.step)
-                }
-                None => format!("gate {}", gate.step),
-            };
-            tasks.push(builder.gate(&label, GateTask { checks }, &inputs));
+            let mut label = format!("gate {}", gate.step);
+            if let Some(criteria) = &task.criteria {
+                label = format!("{label} by {}", criteria.name);
+            }
+            if let Some(reference) = reference {
+                let other = self::label(&self.steps[reference.step].decl.name, reference.output.name);
+                label = format!("{label} to {other}");
+            }
+            tasks.push(builder.gate(&label, task, &inputs));
         }
         Some(Gate { step: gate.step, target, tasks })
     }
@@ -245,8 +246,8 @@ impl<'a, 'r> Nodes<'a, 'r> {
         if let Some(reference) = column.reference {
             inputs.push(("reference", self.id(reference)?));
         }
-        let checks = vec![column.check];
-        let task = builder.gate(&format!("measure {}", column.name), GateTask { checks }, &inputs);
+        let task = GateTask { checks: vec![column.check], criteria: None };
+        let task = builder.gate(&format!("measure {}", column.name), task, &inputs);
         Some(Column { name: column.name, step: column.step, metric: column.metric, task })
     }
 }

@@ -187,7 +187,7 @@ impl Columns<'_, '_> {
     ) -> Option<(String, Producer)> {
         let named = |producer: Producer| (self.steps[producer.step].decl.name.clone(), producer);
         let mut gates = self.gates.iter().filter(|gate| gate.step == step).flat_map(|gate| &gate.groups);
-        let by_gate = gates.find_map(|(reference, _)| *reference);
+        let by_gate = gates.find_map(|group| group.reference);
         let links = || self.wiring.producers[target.step].iter().find(|(link, _)| link.input == "reference");
         if let Some(found) = by_gate.or_else(|| links().map(|(_, producer)| *producer)) {
             return Some(named(found));

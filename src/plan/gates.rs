@@ -1,9 +1,15 @@
 //! The `[gates]` section: which checks a step's mesh must pass.
 
+mod criteria;
+
 use std::collections::BTreeMap;
+
+pub use criteria::{CRITERIA, CRITERIA_KEYS};
+use criteria::{named, standards};
 
 use super::bind::BoundDecl;
 use super::case::CaseContext;
+use super::task::GateTask;
 use super::wire::{Producer, Wiring, producer};
 use crate::metric::gate::{Check, Limit, judges_faces};
 use crate::metric::registry::{Direction, METRICS, MetricDef, Needs, Unit, find};
@@ -20,16 +26,20 @@ pub(super) struct GateDecl {
     /// As the recipe names it.
     pub(super) step: String,
     pub(super) target: Producer,
-    /// Checks by what they compare with: the producer, or none.
+    /// Its tasks.
     pub(super) groups: Vec<Group>,
 }
 
-/// Checks that compare with the same output, or with none.
-pub(super) type Group = (Option<Producer>, Vec<Check>);
+/// What one task judges: checks that compare with the same output or with none, or the criteria of one standard.
+pub(super) struct Group {
+    pub(super) reference: Option<Producer>,
+    pub(super) task: GateTask,
+}
 
 /// Reads all gates.
 pub(super) fn gates(steps: &[BoundDecl<'_>], wiring: &Wiring, context: &mut CaseContext<'_>) -> Vec<GateDecl> {
     let recipe = context.recipe;
+    let standards = standards(context);
     let mut gates = Vec::new();
     for (name, entry) in recipe.gates.in_order() {
         let target = producer(name, entry.key, steps, context);
@@ -45,7 +55,10 @@ pub(super) fn gates(steps: &[BoundDecl<'_>], wiring: &Wiring, context: &mut Case
             let message = format!("`{name}` gives {port}, and a gate looks at a mesh");
             context.problems.push(Diagnostic::error(entry.key, message));
         }
-        let groups = checks(table, steps, wiring, context);
+        let mut groups = checks(table, steps, wiring, context);
+        if let Some(entry) = table.get(CRITERIA) {
+            groups.extend(named(entry, &standards, (steps, wiring), context));
+        }
         if let Some(target) = target {
             gates.push(GateDecl { step: name.to_owned(), target, groups });
         }
@@ -62,7 +75,7 @@ pub(super) fn is_mesh(port: Port) -> bool {
 
 fn checks(table: &Table, steps: &[BoundDecl<'_>], wiring: &Wiring, context: &mut CaseContext<'_>) -> Vec<Group> {
     let mut groups: BTreeMap<Option<(usize, &str)>, Group> = BTreeMap::new();
-    for (metric, entry) in &table.entries {
+    for (metric, entry) in table.entries.iter().filter(|(metric, _)| *metric != CRITERIA) {
         if is_full(&context.problems) {
             break;
         }
@@ -73,7 +86,8 @@ fn checks(table: &Table, steps: &[BoundDecl<'_>], wiring: &Wiring, context: &mut
         };
         let Some((check, reference)) = check(metric, entry, &value, steps, wiring, context) else { continue };
         let key = reference.map(|reference| (reference.step, reference.output.name));
-        groups.entry(key).or_insert((reference, Vec::new())).1.push(check);
+        let group = groups.entry(key).or_insert_with(|| Group { reference, task: GateTask::default() });
+        group.task.checks.push(check);
     }
     groups.into_values().collect()
 }
@@ -82,7 +96,8 @@ fn known_metric(name: &str, entry: &Entry, context: &mut CaseContext<'_>) -> Opt
     let known = find(name);
     if known.is_none() {
         let message = format!("there is no metric `{name}`");
-        let help = did_you_mean(name, "metrics", METRICS.iter().map(|metric| metric.name));
+        let names = METRICS.iter().map(|metric| metric.name).chain([CRITERIA]);
+        let help = did_you_mean(name, "metrics", names);
         context.problems.push(Diagnostic::error(entry.key, message).help_opt(help));
     }
     known

@@ -24,6 +24,9 @@ pub type ContentHash = blake3::Hash;
 /// Raised whenever an equal mesh may give another verdict of a gate.
 pub const GATE_REVISION: u32 = 4;
 
+/// Raised whenever an equal mesh may be judged otherwise by equal criteria.
+pub const CRITERIA_REVISION: u32 = 1;
+
 /// One value of a walk.
 #[derive(Clone, Copy, Debug)]
 pub enum Field<'a> {
@@ -79,6 +82,18 @@ fn walk_step(step: &StepTask, codec_version: u32, manifest: &mut dyn Manifest) {
 }
 
 fn walk_gate(gate: &GateTask, manifest: &mut dyn Manifest) {
+    if let Some(criteria) = &gate.criteria {
+        manifest.field("criteria", Field::Text(&criteria.name));
+        manifest.field("revision", Field::Integer(CRITERIA_REVISION.into()));
+        let json = |value: serde_json::Result<Value>| value.unwrap_or(Value::Null);
+        walk_json("penalties", &json(serde_json::to_value(criteria.penalties)), manifest);
+        walk_json("except", &json(serde_json::to_value(&criteria.except)), manifest);
+        for criterion in &criteria.criteria {
+            let name = format!("criterion {}", criterion.metric);
+            walk_json(&name, &json(serde_json::to_value(criterion)), manifest);
+        }
+        return;
+    }
     manifest.field("gate", Field::Entries(gate.checks.len()));
     manifest.field("revision", Field::Integer(GATE_REVISION.into()));
     for check in &gate.checks {

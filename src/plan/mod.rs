@@ -34,7 +34,7 @@ pub use bind::LOCK_KEYS;
 pub use build::{plan, plan_cases};
 pub use case::{CaseSpec, Context};
 pub use columns::{COLUMN_KEYS, ColumnRequest};
-pub use gates::CHECK_KEYS;
+pub use gates::{CHECK_KEYS, CRITERIA, CRITERIA_KEYS};
 pub use key::{Change, ContentHash, Key, Record, task_key, task_record};
 pub use merge::PlanBuilder;
 pub use outputs::{ELEMENTS, METRIC_ENDINGS, OUTPUT_KEYS};

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use crate::metric::gate::Check;
+use crate::metric::gate::criteria::Criteria;
 use crate::step::{BoundStep, Inputs, Locks, Produced, StepDef, StepFailure};
 use crate::watch::Watch;
 
@@ -77,8 +78,10 @@ impl fmt::Debug for StepTask {
 ///
 /// A `[gates.STEP]` table becomes one task for the checks that need no other mesh, and one for each mesh compared
 /// with, so that a changed threshold repeats no distance that it does not concern.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct GateTask {
     /// What must hold, in the order of the metric names.
     pub checks: Vec<Check>,
+    /// The standard that must hold; a task has either checks or criteria.
+    pub criteria: Option<Arc<Criteria>>,
 }

@@ -10,13 +10,13 @@ use toml::de::DeTable;
 use super::diagnostic::Diagnostic;
 use super::drop;
 use super::source::{SourceMap, Span};
-use super::tree::{Entry, Node, Table};
+use super::tree::{Entry, Node, Table, Tree};
 
 /// Gives the text of a recipe, or says why it cannot.
 pub type Loader<'a> = &'a dyn Fn(&Path) -> Result<String, String>;
 
-/// Longer than any recipe a person keeps; a mesh given by mistake ends here.
-const LARGEST: usize = 4 << 20;
+/// Longer than any recipe a person keeps, in bytes; a mesh given by mistake ends here.
+pub const LARGEST: usize = 4 << 20;
 
 /// Recipes that extend each other.
 const DEEPEST: usize = 16;
@@ -36,8 +36,29 @@ pub(super) fn load(
             return None;
         }
     };
-    let mut chain = Chain { loader, sources, problems, open: vec![normalize(path)] };
-    chain.file(path, &text)
+    let mut chain = Chain { loader, sources, problems, open: vec![normalize(path)], what: "recipe" };
+    let mut table = chain.file(path, &text)?;
+    chain.open.clear();
+    chain.criteria(&mut table);
+    Some(table)
+}
+
+/// Loads a file of criteria and what it extends.
+pub(super) fn load_criteria(
+    path: &Path,
+    loader: Loader<'_>,
+    sources: &mut SourceMap,
+    problems: &mut Vec<Diagnostic>,
+) -> Option<Table> {
+    let mut chain = Chain { loader, sources, problems, open: vec![normalize(path)], what: "file of criteria" };
+    match loader(path) {
+        Ok(text) => chain.file(path, &text).map(|table| chain.without_file(table)),
+        Err(reason) => {
+            let message = format!("cannot read the criteria `{}`: {reason}", path.display());
+            problems.push(Diagnostic { labels: Vec::new(), ..Diagnostic::error(Span::default(), message) });
+            None
+        }
+    }
 }
 
 struct Chain<'a> {
@@ -46,6 +67,8 @@ struct Chain<'a> {
     problems: &'a mut Vec<Diagnostic>,
     /// The files from the first one to the one being read.
     open: Vec<PathBuf>,
+    /// What they are.
+    what: &'static str,
 }
 
 impl Chain<'_> {
@@ -59,7 +82,7 @@ impl Chain<'_> {
         };
         let span = extends.value.span;
         let Node::Text(name) = &extends.value.value else {
-            let message = format!("`extends` names one recipe file, got {}", extends.value.value.kind());
+            let message = format!("`extends` names one {}, got {}", self.what, extends.value.value.kind());
             self.problems.push(Diagnostic::error(span, message).help("write extends = \"lab-standard.toml\""));
             return Some(table);
         };
@@ -79,12 +102,12 @@ impl Chain<'_> {
         if let Some(first) = self.open.iter().position(|open| *open == normal) {
             let names: Vec<_> =
                 self.open[first..].iter().chain([&normal]).map(|open| open.display().to_string()).collect();
-            let message = format!("recipes extend each other in a circle: {}", names.join(" -> "));
+            let message = format!("{} extend each other in a circle: {}", self.many(), names.join(" -> "));
             self.problems.push(Diagnostic::error(span, message));
             return None;
         }
         if self.open.len() >= DEEPEST {
-            let message = format!("more than {DEEPEST} recipes extend each other");
+            let message = format!("more than {DEEPEST} {} extend each other", self.many());
             self.problems.push(Diagnostic::error(span, message));
             return None;
         }
@@ -96,12 +119,62 @@ impl Chain<'_> {
                 table
             }
             Err(reason) => {
-                let message = format!("cannot read the extended recipe `{}`: {reason}", path.display());
-                let help = "the path is relative to the recipe that writes it";
+                let message = format!("cannot read the extended {} `{}`: {reason}", self.what, path.display());
+                let help = format!("the path is relative to the {} that writes it", self.what);
                 self.problems.push(Diagnostic::error(span, message).help(help));
                 None
             }
         }
+    }
+
+    fn many(&self) -> &'static str {
+        if self.what == "recipe" { "recipes" } else { "files of criteria" }
+    }
+
+    /// Puts below each table of `[criteria]` that names a `file` what that file says.
+    fn criteria(&mut self, root: &mut Table) {
+        let Some(Entry { value: Tree { value: Node::Table(all), .. }, .. }) = root.entries.get_mut("criteria") else {
+            return;
+        };
+        self.what = "file of criteria";
+        for entry in all.entries.values_mut() {
+            let Node::Table(own) = &mut entry.value.value else { continue };
+            let Some(file) = own.take("file") else { continue };
+            let span = file.value.span;
+            let Node::Text(name) = &file.value.value else {
+                let message = format!("`file` names a file of criteria, got {}", file.value.value.kind());
+                let problem = Diagnostic::error(span, message).help("write file = \"lab.criteria.toml\"");
+                self.problems.push(problem);
+                continue;
+            };
+            let path = self.sources.folder(span).join(name);
+            match (self.loader)(&path) {
+                Ok(text) => {
+                    self.open = vec![normalize(&path)];
+                    if let Some(base) = self.file(&path, &text) {
+                        *own = merge(self.without_file(base), std::mem::take(own), &[]);
+                        continue;
+                    }
+                }
+                Err(reason) => {
+                    let message = format!("cannot read the criteria `{}`: {reason}", path.display());
+                    let help = "the path is relative to the recipe that writes it";
+                    self.problems.push(Diagnostic::error(span, message).help(help));
+                }
+            }
+            // What is left says that the criteria are not whole.
+            own.entries.insert("file".to_owned(), file);
+        }
+    }
+
+    /// A file of criteria does not name another one as a recipe does.
+    fn without_file(&mut self, mut table: Table) -> Table {
+        if let Some(file) = table.take("file") {
+            let message = "a file of criteria has no key `file`";
+            let help = "write extends = \"other.criteria.toml\" for what it changes";
+            self.problems.push(Diagnostic::error(file.key, message).help(help));
+        }
+        table
     }
 }
 

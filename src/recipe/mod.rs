@@ -24,15 +24,16 @@ use std::sync::Arc;
 pub use circle::{Order, order};
 pub use diagnostic::{Diagnostic, Diagnostics, Label, Severity, is_full};
 pub use expression::Value;
-pub use load::{Loader, normalize};
+pub use load::{LARGEST, Loader, normalize};
 pub use scope::{Scope, node as node_of};
 pub use source::{SourceMap, Span};
 use suggest::did_you_mean;
 pub use tree::{Entry, Node, Table, Tree};
+pub use unused::names_used;
 
 /// The sections of a recipe.
-const SECTIONS: [&str; 10] =
-    ["name", "description", "inputs", "params", "steps", "gates", "outputs", "sweep", "extends", "drop"];
+const SECTIONS: [&str; 11] =
+    ["name", "description", "inputs", "params", "steps", "gates", "criteria", "outputs", "sweep", "extends", "drop"];
 
 /// What the command line replaces.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -60,6 +61,35 @@ pub struct StepDecl {
     pub table: Table,
 }
 
+/// Reads a file of criteria with `loader`, and the files that it extends: its table, and the texts. `set` replaces
+/// parameters that it has.
+///
+/// # Errors
+/// When a text cannot be read or is not TOML, or does not extend what it says.
+pub fn load_criteria(
+    path: &Path,
+    loader: Loader<'_>,
+    set: &[(String, String)],
+) -> Result<(Table, Arc<SourceMap>), Diagnostics> {
+    let (mut sources, mut problems) = (SourceMap::default(), Vec::new());
+    let mut table = load::load_criteria(path, loader, &mut sources, &mut problems);
+    for (name, text) in set {
+        let base = sources.add("--set", "", format!("{name}={text}"));
+        let start = base + name.len() + 1;
+        let params =
+            table.as_mut().and_then(|table| table.entries.get_mut("params")).map(|entry| &mut entry.value.value);
+        if let Some(Node::Table(params)) = params
+            && let Some(entry) = params.entries.get_mut(name)
+        {
+            entry.value = Tree { span: Span { start, end: start + text.len() }, value: argument::value(text) };
+        }
+    }
+    match table {
+        Some(table) if problems.is_empty() => Ok((table, Arc::new(sources))),
+        _ => Err(Diagnostics::new(Arc::new(sources), problems)),
+    }
+}
+
 /// A recipe whose sections have the right form.
 #[derive(Clone, Debug)]
 pub struct Recipe {
@@ -79,6 +109,8 @@ pub struct Recipe {
     pub steps: Vec<StepDecl>,
     /// Gates by step.
     pub gates: Table,
+    /// Criteria by name, with what their files say below what the recipe says.
+    pub criteria: Table,
     /// Outputs by step.
     pub outputs: Table,
     /// The `[sweep]` section as it is.
@@ -111,6 +143,7 @@ impl Recipe {
             params: parts.table("params"),
             steps: parts.steps(),
             gates: parts.table("gates"),
+            criteria: parts.table("criteria"),
             outputs: parts.table("outputs"),
             sweep: parts.table("sweep"),
             sources: Arc::default(),

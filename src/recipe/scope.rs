@@ -68,6 +68,22 @@ impl Scope {
         scope
     }
 
+    /// The scope of a table with parameters of its own, each of which may be an expression over this scope.
+    #[must_use]
+    pub fn within(&self, params: &Table, sources: &SourceMap, problems: &mut Vec<Diagnostic>) -> Self {
+        let mut scope = self.clone();
+        for (name, entry) in &params.entries {
+            let value = match plain(&entry.value, sources) {
+                Ok(Plain::Value(value)) => Ok(value),
+                Ok(Plain::Formula(formula, at)) => self.evaluate(&formula, at, sources),
+                Err(problem) => Err(Some(problem)),
+            };
+            scope.origins.remove(name);
+            scope.params.insert(name.clone(), value.map_err(|problem| problems.extend(problem)).ok());
+        }
+        scope
+    }
+
     /// The value of a formula; `Err(None)` when it uses a name whose own fault is reported already.
     fn evaluate(&self, formula: &Expression, text: Span, sources: &SourceMap) -> Result<Value, Option<Diagnostic>> {
         let lookup = |name: &str| self.lookup(name);

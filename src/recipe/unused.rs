@@ -14,7 +14,7 @@ use super::tree::{Node, Table, Tree};
 pub(super) fn unused(recipe: &Recipe) -> Vec<Diagnostic> {
     let mut used = BTreeSet::new();
     let steps = recipe.steps.iter().map(|step| &step.table);
-    let sections = [&recipe.params, &recipe.gates, &recipe.outputs, &recipe.sweep];
+    let sections = [&recipe.params, &recipe.gates, &recipe.criteria, &recipe.outputs, &recipe.sweep];
     if !steps.chain(sections).all(|table| table_uses(table, &mut used)) {
         return Vec::new();
     }
@@ -27,6 +27,12 @@ pub(super) fn unused(recipe: &Recipe) -> Vec<Diagnostic> {
             Diagnostic::error(entry.key, format!("nothing uses the parameter `{name}`")).help_opt(help)
         })
         .collect()
+}
+
+/// The parameters that the values of a table use; none while an expression is wrong.
+pub fn names_used(table: &Table) -> Option<BTreeSet<String>> {
+    let mut used = BTreeSet::new();
+    table_uses(table, &mut used).then_some(used)
 }
 
 /// Notes the names that the values of a table use; false where an expression is wrong.

@@ -17,6 +17,8 @@ use super::diff::{MeshDiff, RunDiff};
 use super::measure::unit_text;
 use super::sweep::SweepTable;
 use crate::metric::Value;
+use crate::metric::element;
+use crate::metric::gate::criteria::CriteriaReport;
 use crate::metric::registry::find;
 
 /// What a document holds.
@@ -40,6 +42,9 @@ pub enum Kind {
 pub struct Measured {
     /// Values by metric name.
     pub metrics: BTreeMap<String, Value>,
+    /// How well the mesh keeps the criteria that were asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub criteria: Option<CriteriaReport>,
 }
 
 /// The document of this content.
@@ -101,7 +106,8 @@ fn bare_value(table: &Map<String, Json>) -> Option<Json> {
 }
 
 fn note_unit(metric: &str, units: &mut Map<String, Json>) {
-    if let Some(unit) = find(metric).map(|metric| unit_text(metric.unit)).filter(|unit| !unit.is_empty()) {
+    let unit = find(metric).map(|metric| metric.unit).or_else(|| element::find(metric).map(|metric| metric.unit));
+    if let Some(unit) = unit.map(unit_text).filter(|unit| !unit.is_empty()) {
         units.insert(metric.to_owned(), unit.into());
     }
 }
@@ -172,6 +178,6 @@ mod tests {
             },
             "units": { "area": "area", "min-edge": "length", "self-intersections": "or more" },
         });
-        assert_eq!(document(Kind::Measure, &Measured { metrics }).unwrap(), expected);
+        assert_eq!(document(Kind::Measure, &Measured { metrics, criteria: None }).unwrap(), expected);
     }
 }

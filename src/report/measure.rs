@@ -26,7 +26,8 @@ pub fn value_text(value: &Value) -> String {
     }
 }
 
-pub(super) fn unit_text(unit: Unit) -> &'static str {
+/// The unit of a metric in words; empty where the value says it.
+pub fn unit_text(unit: Unit) -> &'static str {
     match unit {
         Unit::Length => "length",
         Unit::Area => "area",

@@ -6,6 +6,7 @@
 mod advice;
 pub mod diff;
 pub mod json;
+pub mod junit;
 pub mod lock;
 pub mod measure;
 pub mod page;
@@ -21,6 +22,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::metric::Measurement;
 use crate::metric::gate::GateRow;
+use crate::metric::gate::criteria::CriteriaReport;
 pub use crate::run::in_case;
 use crate::run::{
     Case, Figures, FileState, Gate, Outcome, Plan, RunOutcome, Task, TaskId, TaskOutcome, TaskState, VERSION,
@@ -120,8 +122,11 @@ pub struct GateSection {
     pub references: Vec<String>,
     /// Whether all checks hold; absent where they could not be decided.
     pub passed: Option<bool>,
-    /// The checks.
+    /// The checks; criteria are one row each.
     pub rows: Vec<GateRow>,
+    /// What stands behind the rows of criteria.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub criteria: Vec<CriteriaReport>,
     /// Why checks could not be decided.
     pub failures: Vec<StepFailure>,
     /// For checks that failed: `METRIC: which step and parameter to turn`.
@@ -344,13 +349,15 @@ fn gate_section(names: &Names<'_>, gate: &Gate, outcome: &RunOutcome) -> GateSec
     references.sort_unstable();
     references.dedup();
     let (rows, failures) = (Vec::new(), Vec::new());
-    let advice = Vec::new();
-    let mut section = GateSection { step: gate.step.clone(), references, passed: Some(true), rows, failures, advice };
+    let (advice, criteria) = (Vec::new(), Vec::new());
+    let step = gate.step.clone();
+    let mut section = GateSection { step, references, passed: Some(true), rows, criteria, failures, advice };
     for task in gate.tasks.iter().map(|task| outcome.task(*task)) {
         match task.gate_report() {
             Some(report) => {
                 section.passed = section.passed.map(|passed| passed && report.passed());
                 section.rows.extend(report.rows);
+                section.criteria.extend(report.criteria);
             }
             None => section.passed = None,
         }

@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::measure::value_text;
 use super::table;
 use crate::metric::Value;
+use crate::metric::gate::criteria::row_name;
 use crate::metric::gate::{GateReport, GateRow};
 use crate::metric::registry::{self, Direction, MetricDef};
 use crate::run::{Case, Plan, RunOutcome, Task, TaskState};
@@ -217,6 +218,16 @@ fn columns(case: &Case, plan: &Plan) -> Vec<SweepColumn> {
             let Task::Gate(checks) = &plan.node(*task).task else { continue };
             for metric in checks.checks.iter().filter_map(|check| registry::find(&check.metric)) {
                 columns.push(column(&format!("{}.{}", gate.step, metric.name), &gate.step, metric, true));
+            }
+            if let Some(criteria) = &checks.criteria {
+                let metric = row_name(&criteria.name);
+                columns.push(SweepColumn {
+                    name: format!("{}.{metric}", gate.step),
+                    step: gate.step.clone(),
+                    metric,
+                    better: Better::Lower,
+                    gate: true,
+                });
             }
         }
     }

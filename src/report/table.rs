@@ -1,5 +1,7 @@
 //! Reports as aligned tables for a terminal.
 
+pub mod criteria;
+
 use std::fmt::Write;
 
 use comfy_table::{CellAlignment, Table};
@@ -23,6 +25,9 @@ pub fn report(report: &Report) -> String {
         }
         if !case.gates.is_empty() {
             parts.push(gates(case));
+        }
+        for (gate, criteria) in case.gates.iter().flat_map(|gate| gate.criteria.iter().map(move |c| (gate, c))) {
+            parts.push(criteria::table(criteria, Some(&gate.step)));
         }
         if !case.files.is_empty() {
             parts.push(files(case, report));

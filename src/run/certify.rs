@@ -129,7 +129,29 @@ impl Attempt {
             self.broken.extend(self.groups.iter().map(|what| format!("`groups-kept` asks for {what}")));
         }
         let Some(file) = &self.file else { return Ok(()) };
-        let rows = shared.report(id).map(|report| report.rows.as_slice()).unwrap_or_default();
+        let Some(task) = self.at_risk(task, shared.report(id)) else { return Ok(()) };
+        let reference = shared.plan.inputs(id).into_iter().find(|(name, _)| *name == "reference");
+        let reference = reference.map(|(_, input)| gate::mesh(shared, input)).transpose()?;
+        let work = || gate::evaluate(&task, file, reference.as_ref(), watch);
+        let report = shared.pool()?.install(work).map_err(Finished::Failed)?;
+        let failed = report.rows.iter().filter(|row| !row.passed);
+        self.broken.extend(failed.map(|row| {
+            if task.criteria.is_some() {
+                return format!("{} elements fail the {}", row.fault_count, row.metric);
+            }
+            let measured = row.measured.map_or_else(|| "undefined".to_owned(), |value| short(value.as_f64()));
+            format!("`{}` is {measured}, and must be {}", row.metric, row.limit)
+        }));
+        Ok(())
+    }
+
+    /// What of a gate the file may break, although the mesh holds it; none where that is nothing.
+    fn at_risk(&self, task: &GateTask, report: Option<&GateReport>) -> Option<GateTask> {
+        if task.criteria.is_some() {
+            // Faces of another kind have other shapes.
+            return self.moved.is_some().then(|| task.clone());
+        }
+        let rows = report.map(|report| report.rows.as_slice()).unwrap_or_default();
         let at_risk = |(check, row): (&Check, &GateRow)| {
             let is_distance = bounds_distance(check);
             let is_safe = is_distance && row.slack.zip(self.moved).is_some_and(|(slack, moved)| moved <= slack);
@@ -137,19 +159,7 @@ impl Attempt {
             (!is_safe && !check.files && (is_distance || self.moved.is_some())).then(|| check.clone())
         };
         let checks: Vec<Check> = task.checks.iter().zip(rows).filter_map(at_risk).collect();
-        if checks.is_empty() {
-            return Ok(());
-        }
-        let reference = shared.plan.inputs(id).into_iter().find(|(name, _)| *name == "reference");
-        let reference = reference.map(|(_, input)| gate::mesh(shared, input)).transpose()?;
-        let work = || gate::evaluate(&checks, file, reference.as_ref(), watch);
-        let report = shared.pool()?.install(work).map_err(Finished::Failed)?;
-        let failed = report.rows.iter().filter(|row| !row.passed);
-        self.broken.extend(failed.map(|row| {
-            let measured = row.measured.map_or_else(|| "undefined".to_owned(), |value| short(value.as_f64()));
-            format!("`{}` is {measured}, and must be {}", row.metric, row.limit)
-        }));
-        Ok(())
+        (!checks.is_empty()).then_some(GateTask { checks, criteria: None })
     }
 }
 

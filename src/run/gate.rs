@@ -4,23 +4,32 @@ use std::sync::Arc;
 
 use super::node::Finished;
 use super::shared::Shared;
-use crate::metric::gate::{Check, GateError, GateReport, judge};
+use crate::metric::gate::criteria::{self, CriteriaError};
+use crate::metric::gate::{GateError, GateReport, judge};
 use crate::metric::{Measured, Subject};
-use crate::plan::TaskId;
+use crate::plan::{GateTask, TaskId};
 use crate::step::StepFailure;
 use crate::watch::{Cancelled, Watch};
 
-/// Judges a mesh, compared with `reference` where the checks ask for it.
+/// Judges a mesh by checks or by criteria, compared with `reference` where they ask for it.
 pub(super) fn evaluate(
-    checks: &[Check],
+    task: &GateTask,
     target: &Measured,
     reference: Option<&Arc<Measured>>,
     watch: &Watch,
 ) -> Result<GateReport, StepFailure> {
-    judge(&Subject::kept(target, reference, watch), checks).map_err(|error| match error {
-        GateError::Cancelled(_) => Cancelled.into(),
-        other => StepFailure::failed(other.to_string()),
-    })
+    let subject = Subject::kept(target, reference, watch);
+    let Some(criteria) = &task.criteria else {
+        return judge(&subject, &task.checks).map_err(|error| match error {
+            GateError::Cancelled(_) => Cancelled.into(),
+            other => StepFailure::failed(other.to_string()),
+        });
+    };
+    match criteria::judge(&subject, criteria) {
+        Ok((report, row)) => Ok(GateReport { rows: vec![row], criteria: Some(report) }),
+        Err(CriteriaError::Cancelled(_)) => Err(Cancelled.into()),
+        Err(other) => Err(StepFailure::failed(other.to_string())),
+    }
 }
 
 /// The mesh of a task that a gate judges or compares with.

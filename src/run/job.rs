@@ -129,7 +129,7 @@ fn gate_task(
     }
     let target = target.ok_or_else(|| Finished::Failed(StepFailure::failed("the gate has no mesh to check")))?;
     let _turn = target.turn();
-    let work = || gate::evaluate(&task.checks, &target, reference.as_ref(), watch);
+    let work = || gate::evaluate(task, &target, reference.as_ref(), watch);
     let work = || catch_unwind(AssertUnwindSafe(work));
     let report = shared.pool()?.install(work).unwrap_or_else(|payload| Err(panicked(payload.as_ref())));
     let report = report.map_err(Finished::Failed)?;

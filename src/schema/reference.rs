@@ -5,7 +5,8 @@ use std::fmt::Write;
 use serde_json::Value;
 
 use super::nested::{NestedKey, nested_tables};
-use crate::metric::registry::{METRICS, Needs, Unit};
+use crate::metric::element::ELEMENT_METRICS;
+use crate::metric::registry::{Direction, METRICS, Needs, Unit};
 use crate::step::parameters::{ParameterSchema, reference};
 use crate::step::{OutPort, Port, StepDef};
 
@@ -193,22 +194,36 @@ fn metrics(page: &mut String) {
          | metric | unit | measured on | meaning |\n|---|---|---|---|\n",
     );
     for metric in METRICS.iter() {
-        let unit = match metric.unit {
-            Unit::Count => "count",
-            Unit::Flag => "true or false",
-            Unit::Length => "length",
-            Unit::Area => "area",
-            Unit::Volume => "volume",
-            Unit::Degrees => "degrees",
-            Unit::Share => "share",
-            Unit::Ratio => "number",
-        };
         let needs = match metric.needs {
             Needs::Mesh => "any mesh",
             Needs::Triangles => "triangles",
             Needs::Quads => "quads",
             Needs::Reference => "a mesh and a reference",
         };
-        let _ = writeln!(page, "| `{}` | {unit} | {needs} | {} |", metric.name, cell(metric.doc));
+        let _ = writeln!(page, "| `{}` | {} | {needs} | {} |", metric.name, unit(metric.unit), cell(metric.doc));
+    }
+    page.push_str(
+        "\n## Metrics of elements\n\n\
+         Criteria name them, each with its levels: `skew = { ideal = 0, good = 10, warn = 35, fail = 45, worst = 70 }`; \
+         see `docs/criteria.md`.\n\n\
+         | metric | unit | of | good is | meaning |\n|---|---|---|---|---|\n",
+    );
+    for metric in ELEMENT_METRICS {
+        let (name, on, doc) = (metric.name, metric.on().text(), cell(metric.doc));
+        let better = if metric.direction == Direction::Higher { "more" } else { "less" };
+        let _ = writeln!(page, "| `{name}` | {} | {on} | {better} | {doc} |", unit(metric.unit));
+    }
+}
+
+fn unit(unit: Unit) -> &'static str {
+    match unit {
+        Unit::Count => "count",
+        Unit::Flag => "true or false",
+        Unit::Length => "length",
+        Unit::Area => "area",
+        Unit::Volume => "volume",
+        Unit::Degrees => "degrees",
+        Unit::Share => "share",
+        Unit::Ratio => "number",
     }
 }

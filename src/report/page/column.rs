@@ -114,7 +114,7 @@ fn shape(mesh: &Soup) -> Vec<Column> {
     columns
 }
 
-fn face_column(key: &str, title: &str, unit: &'static str, values: Vec<f64>) -> Column {
+pub(super) fn face_column(key: &str, title: &str, unit: &'static str, values: Vec<f64>) -> Column {
     Column {
         key: key.to_owned(),
         title: title.to_owned(),

@@ -7,6 +7,7 @@ use serde::Serialize;
 use serde_json::{Value as Json, json};
 
 use super::column::{self, Reference, columns};
+use super::criteria::{self, Judged};
 use super::outline::{CaseMesh, Outline, has_mesh};
 use super::pack::Blobs;
 use super::shown::{MeshData, shown};
@@ -14,7 +15,8 @@ use super::worst::{Worst, worst};
 use super::{Library, MOST_BYTES, MOST_FACES};
 use crate::mesh::geometry::triangle_angles;
 use crate::mesh::{Facet, Soup, Surface};
-use crate::metric::{self, Measurement, quad_shape::quad_shape};
+use crate::metric::element::ElementMetric;
+use crate::metric::{self, Measurement, element, quad_shape::quad_shape};
 use crate::report::CaseReport;
 use crate::report::picture::{self, ramp};
 use crate::run::VERSION;
@@ -107,7 +109,9 @@ pub(super) fn gather(case: &CaseReport, outline: &Outline, library: &dyn Library
         }
     }
     limit = first_limit(&gathered, outline);
-    while pack(&mut gathered, outline, library, reference.as_ref(), limit) > MOST_BYTES && limit > 1000 {
+    let judged = judged(case, library);
+    let judged = Judges { judged: &judged, case };
+    while pack(&mut gathered, outline, library, (reference.as_ref(), &judged), limit) > MOST_BYTES && limit > 1000 {
         limit /= 2;
     }
     gathered
@@ -171,12 +175,53 @@ fn find_out(name: &str, content: &str, library: &dyn Library, reference: Option<
     })
 }
 
+/// The standards that judged steps of a case, by step.
+struct Judges<'a> {
+    judged: &'a [(&'a str, Judged<'a>)],
+    case: &'a CaseReport,
+}
+
+impl<'a> Judges<'a> {
+    /// Those that judged this result, under whatever name of a step; each once.
+    fn of(&self, content: &str) -> impl Iterator<Item = &'a Judged<'a>> {
+        let is_of = |step: &str| {
+            let found = self.case.steps.iter().find(|other| other.name == step);
+            found.is_some_and(|step| step.content.as_deref() == Some(content))
+        };
+        let mut names: Vec<&str> = Vec::new();
+        let mut all: Vec<&Judged<'_>> = Vec::new();
+        for (step, judged) in self.judged {
+            if is_of(step) && !names.contains(&judged.report.name.as_str()) {
+                names.push(&judged.report.name);
+                all.push(judged);
+            }
+        }
+        all.into_iter()
+    }
+}
+
+fn judged<'a>(case: &'a CaseReport, library: &dyn Library) -> Vec<(&'a str, Judged<'a>)> {
+    let mut all = Vec::new();
+    for gate in &case.gates {
+        for report in &gate.criteria {
+            let mut metrics = report.rows.iter().filter_map(|row| element::find(&row.metric));
+            let compares = metrics.any(ElementMetric::needs_reference);
+            let names = gate.references.iter().filter(|_| compares);
+            let content = |name: &String| case.steps.iter().find(|step| step.name == *name)?.content.clone();
+            let reference = names.filter_map(content).find_map(|content| open(library, &content));
+            let reference = reference.map(|mesh| mesh.soup);
+            all.push((gate.step.as_str(), Judged { report, reference }));
+        }
+    }
+    all
+}
+
 /// Packs the meshes that are shown and gives the length of all arrays.
 fn pack(
     gathered: &mut Gathered,
     outline: &Outline,
     library: &dyn Library,
-    reference: Option<&Reference>,
+    (reference, judges): (Option<&Reference>, &Judges<'_>),
     limit: usize,
 ) -> usize {
     let (mut blobs, mut packed) = (Blobs::default(), BTreeMap::<String, MeshData>::new());
@@ -184,7 +229,8 @@ fn pack(
         if !packed.contains_key(&known.content)
             && let Some(mesh) = open(library, &known.content)
         {
-            let data = shown(&mesh.soup, mesh.surface.as_deref(), reference, limit).pack(&mut blobs);
+            let more = judges.of(&known.content).map(|judged| criteria::column(&mesh.soup, judged)).collect();
+            let data = shown(&mesh.soup, mesh.surface.as_deref(), reference, more, limit).pack(&mut blobs);
             packed.insert(known.content.clone(), data);
         }
     }

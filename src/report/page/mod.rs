@@ -14,6 +14,7 @@
 
 mod chart;
 mod column;
+mod criteria;
 mod front;
 mod graph;
 mod line;
@@ -136,6 +137,7 @@ fn environment() -> Result<Environment<'static>, PageError> {
     environment.set_trim_blocks(true);
     environment.set_lstrip_blocks(true);
     environment.add_template("page.html", include_str!("page.html"))?;
+    environment.add_template("criteria.html", include_str!("criteria.html"))?;
     environment.add_template("sweep.html", include_str!("sweep.html"))?;
     Ok(environment)
 }

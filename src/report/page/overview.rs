@@ -2,10 +2,11 @@
 
 use serde::Serialize;
 
+use super::criteria::CriteriaView;
 use super::graph::{Graph, GraphNode, draw};
 use super::meshes::Gathered;
 use super::outline::Outline;
-use super::text::{anchor, digits, seconds, short, unit, value};
+use super::text::{FaultView, anchor, digits, seconds, short, unit, value};
 use crate::metric::Value;
 use crate::metric::gate::{Fault, FaultKind, GateRow};
 use crate::metric::registry::{self, Direction};
@@ -241,6 +242,7 @@ pub(super) struct GateView {
     verdict: &'static str,
     class: &'static str,
     rows: Vec<RowView>,
+    criteria: Vec<CriteriaView>,
     failures: Vec<String>,
     advice: Vec<String>,
 }
@@ -259,16 +261,6 @@ struct RowView {
     note: String,
 }
 
-/// An element that a link leads to.
-#[derive(Serialize)]
-pub(super) struct FaultView {
-    pub(super) mesh: String,
-    pub(super) label: String,
-    pub(super) value: String,
-    pub(super) at: String,
-    pub(super) place: String,
-}
-
 /// All gates with their rows.
 pub(super) fn gates(case: &CaseReport) -> Vec<GateView> {
     let view = |gate: &crate::report::GateSection| {
@@ -283,6 +275,7 @@ pub(super) fn gates(case: &CaseReport) -> Vec<GateView> {
             verdict,
             class,
             rows: gate.rows.iter().map(|row| row_view(row, &gate.step, gate.references.first())).collect(),
+            criteria: gate.criteria.iter().map(|criteria| super::criteria::view(criteria, &gate.step)).collect(),
             advice: gate.advice.clone(),
             failures: gate.failures.iter().map(|failure| failure.message.clone()).collect(),
         }

@@ -57,12 +57,18 @@ struct LineData {
     ends: String,
 }
 
-/// Computes what is shown of a mesh, with at most `limit` faces.
-pub(super) fn shown(mesh: &Soup, surface: Option<&Surface>, reference: Option<&Reference>, limit: usize) -> Shown {
+/// Computes what is shown of a mesh, with at most `limit` faces; it can be coloured by `more` too.
+pub(super) fn shown(
+    mesh: &Soup,
+    surface: Option<&Surface>,
+    reference: Option<&Reference>,
+    more: Vec<Column>,
+    limit: usize,
+) -> Shown {
     let whole = Shown {
         points: mesh.points.as_slice().to_vec(),
         faces: mesh.faces.iter().map(|facet| facet.corners().iter().map(|v| v.raw()).collect()).collect(),
-        columns: columns(mesh, surface, reference),
+        columns: columns(mesh, surface, reference).into_iter().chain(more).collect(),
         lines: lines(mesh),
         totals: [mesh.points.len(), mesh.faces.len()],
     };

@@ -1,8 +1,20 @@
 //! Words and numbers for the page.
 
+use serde::Serialize;
+
 use crate::metric::Value;
 use crate::metric::registry::Unit;
 use crate::report::table::grouped;
+
+/// An element that a link leads to.
+#[derive(Serialize)]
+pub(super) struct FaultView {
+    pub(super) mesh: String,
+    pub(super) label: String,
+    pub(super) value: String,
+    pub(super) at: String,
+    pub(super) place: String,
+}
 
 /// The text with everything that means something in HTML written out.
 pub(super) fn escape(text: &str) -> String {
