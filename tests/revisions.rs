@@ -29,6 +29,7 @@ const CASES: &[(&str, &str, &str)] = &[
     ("repair", "", ""),
     ("repair", "fill-holes = \"all\", non-manifold = \"seam\", weld = 0.01", ""),
     ("repair", "self-intersections = \"remove\", bodies = \"union\"", ""),
+    ("repair", "self-intersections = \"remove\", bodies = \"keep\"", ""),
     ("select", "name = \"low\", box = { min = [-9, -9, -9], max = [9, 9, 0.5] }", ""),
     ("select", "name = \"up\", of = \"edges\", normal = { direction = [0, 0, 1] }", ""),
     ("features", "", ""),

@@ -33,13 +33,67 @@ fn bodies_that_run_through_each_other_become_one() {
     assert_eq!(removed.faces.len() as u64, removal.pieces_removed);
 }
 
+/// Repairs to bodies apart, and returns their volumes in the order of their faces: each closed, none crossing another.
+fn apart(soup: &Soup) -> (Vec<f64>, RepairStats) {
+    let (surface, stats) = run_with(soup, &removing(Bodies::Keep));
+    let found = self_intersections(&surface.to_soup(), &Watch::silent()).expect("nobody interrupts");
+    assert_eq!((found.crossing().count(), euler(&surface).1), (0, 0));
+    let parts = meshmill::mesh::topology::components(&surface);
+    let mut volumes = vec![0.0; parts.count];
+    for (f, &part) in parts.of_face.enumerate() {
+        let [a, b, c] = surface.corners(f);
+        volumes[part as usize] += a.dot(b.cross(c)) / 6.0;
+    }
+    (volumes, stats)
+}
+
+fn are_near(found: &[f64], expected: &[f64]) {
+    let is_near = found.len() == expected.len() && found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-7);
+    assert!(is_near, "{found:?} is not {expected:?}");
+}
+
 #[test]
-fn bodies_that_are_kept_stay_as_they_are() {
-    let soup = merged(cube([0.0; 3]), &cube([0.5, 0.4, 0.3]));
-    let (surface, stats) = run_with(&soup, &removing(Bodies::Keep));
-    let (reported, _) = run(&soup);
-    assert_eq!(surface, reported);
-    assert!(stats.self_intersections > 0 && stats.removal.is_some_and(|removal| removal.rounds == 0));
+fn bodies_that_are_kept_have_the_common_part_once() {
+    let common = 0.5 * 0.6 * 0.7;
+    let (volumes, stats) = apart(&merged(cube([0.0; 3]), &cube([0.5, 0.4, 0.3])));
+    are_near(&volumes, &[1.0, 1.0 - common]);
+    assert!(stats.removal.is_some_and(|removal| removal.rounds > 0 && removal.pairs_left == 0));
+    // The one that comes first in the file keeps it.
+    let mut small = cube([0.5, 0.4, 0.3]);
+    small.points.iter_mut().for_each(|p| *p = DVec3::splat(0.5) + 0.5 * *p);
+    let overlap = (1.0 - 0.75) * (1.0 - 0.7) * (1.0 - 0.65);
+    are_near(&apart(&merged(small.clone(), &cube([0.0; 3]))).0, &[0.125, 1.0 - overlap]);
+    are_near(&apart(&merged(cube([0.0; 3]), &small)).0, &[1.0, 0.125 - overlap]);
+    // Three in a row, the middle one last.
+    let row = merged(merged(cube([0.0; 3]), &cube([1.5, 0.0, 0.0])), &cube([0.75, 0.1, 0.2]));
+    are_near(&apart(&row).0, &[1.0, 1.0, 1.0 - 2.0 * 0.25 * 0.9 * 0.8]);
+}
+
+#[test]
+fn bodies_that_are_kept_may_touch() {
+    // By a whole face, whose triangles are the same or not, by a part of it, by an edge and by a corner.
+    for at in [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.25, 0.5], [1.0, 1.0, 0.0], [1.0, 1.0, 0.5], [1.0, 1.0, 1.0]] {
+        let (volumes, stats) = apart(&merged(cube([0.0; 3]), &cube(at)));
+        are_near(&volumes, &[1.0, 1.0]);
+        assert!(stats.removal.is_none(), "{at:?}");
+    }
+    // Flush, so that they overlap without a face through another one.
+    are_near(&apart(&merged(cube([0.0; 3]), &cube([0.5, 0.0, 0.0]))).0, &[1.0, 0.5]);
+    // A copy has nothing that is not of the first one.
+    are_near(&apart(&merged(cube([0.0; 3]), &cube([1e-3, 0.0, 0.0]))).0, &[1.0, 1e-3]);
+}
+
+#[test]
+fn a_cavity_is_of_the_body_round_it() {
+    let mut inner = cube([0.0; 3]);
+    inner.points.iter_mut().for_each(|p| *p = DVec3::splat(0.25) + 0.5 * *p);
+    // Reaches through the wall into the cavity.
+    let mut bar = cube([0.0; 3]);
+    bar.points.iter_mut().for_each(|p| *p = DVec3::new(0.5, 0.45, 0.45) + *p * DVec3::new(1.0, 0.1, 0.1));
+    let soup = merged(merged(cube([0.0; 3]), &inner), &bar);
+    let (volumes, _) = apart(&soup);
+    let total: f64 = volumes.iter().sum();
+    assert!((total - (1.0 - 0.125 + 0.01 - 0.25 * 0.01)).abs() < 1e-7, "{volumes:?}");
 }
 
 /// A sphere of which one vertex is pulled through the other side.

@@ -24,12 +24,22 @@ pub(super) struct Duplicates {
     pub(super) cancelled: u64,
 }
 
+/// What becomes of two faces that look in opposite directions, where an even number of faces meets at each edge. Else
+/// one stays.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Opposite {
+    /// Both go, because they enclose nothing.
+    pub(super) cancel: bool,
+    /// Both stay where they are a wall between solids.
+    pub(super) keep_walls: bool,
+}
+
 /// Drops repeated faces.
 ///
 /// One face of each set stays, with two exceptions that keep neighbours meeting in pairs. Two faces that look in
-/// opposite directions both go, if `cancel` allows it and an even number of faces meets at each of their edges. And of
-/// two that look the same way both stay where each of their neighbours needs one of them, as where solids touch.
-pub(super) fn drop_duplicates(draft: &mut Draft, table: &EdgeTable, cancel: bool) -> Duplicates {
+/// opposite directions may both go or both stay. And of two that look the same way both stay where each of their
+/// neighbours needs one of them, as where solids touch.
+pub(super) fn drop_duplicates(draft: &mut Draft, table: &EdgeTable, rule: Opposite) -> Duplicates {
     let mut dropped = Duplicates::default();
     let groups = duplicate_groups(&draft.faces, table);
     if groups.is_empty() {
@@ -48,10 +58,15 @@ pub(super) fn drop_duplicates(draft: &mut Draft, table: &EdgeTable, cancel: bool
         settled.push((first, group[1], opposite));
     }
     let sides = Sides::new(&keep, table);
+    let pairs = settled.iter().filter_map(|&(first, _, opposite)| Some([first, opposite?]));
+    let walls = if rule.keep_walls { walls(pairs, &keep, table) } else { vec![false; keep.len()] };
     for (first, repeat, opposite) in settled {
         if let Some(second) = opposite {
+            if walls[first.index()] {
+                continue;
+            }
             keep[second.index()] = false;
-            if cancel && sides.odd[first.index()] == 0 {
+            if rule.cancel && sides.odd[first.index()] == 0 {
                 keep[first.index()] = false;
                 dropped.cancelled += 2;
             } else {
@@ -64,6 +79,41 @@ pub(super) fn drop_duplicates(draft: &mut Draft, table: &EdgeTable, cancel: bool
     }
     draft.retain_faces(&keep);
     dropped
+}
+
+/// Which faces of opposite pairs are walls: solids lie on both sides of all that is connected of them, so that nowhere
+/// such a pair ends at an edge of its own.
+fn walls(pairs: impl Iterator<Item = [FaceId; 2]>, keep: &[bool], table: &EdgeTable) -> Vec<bool> {
+    let mut second = vec![None; keep.len()];
+    for [a, b] in pairs {
+        second[a.index()] = Some(b);
+        second[b.index()] = Some(a);
+    }
+    let mut joined: Vec<usize> = (0..keep.len()).collect();
+    let root = |joined: &mut Vec<usize>, mut f: usize| {
+        while joined[f] != f {
+            joined[f] = joined[joined[f]];
+            f = joined[f];
+        }
+        f
+    };
+    let mut ends = Vec::new();
+    for (_, _, group) in table.edges() {
+        let faces: Vec<usize> = group.iter().map(|(_, h)| face_of(*h).index()).filter(|&f| keep[f]).collect();
+        let paired: Vec<usize> = faces.iter().copied().filter(|&f| second[f].is_some()).collect();
+        for pair in paired.windows(2) {
+            let [a, b] = [pair[0], pair[1]].map(|f| root(&mut joined, f));
+            joined[a.max(b)] = a.min(b);
+        }
+        if faces.len() % 2 == 1 || faces.len() == 2 {
+            ends.extend(paired);
+        }
+    }
+    let mut is_open = vec![false; keep.len()];
+    for f in ends {
+        is_open[root(&mut joined, f)] = true;
+    }
+    (0..keep.len()).map(|f| second[f].is_some() && !is_open[root(&mut joined, f)]).collect()
 }
 
 /// For each face, at how many of its sides the number of kept faces is odd, and at how many it is odd and at least 3.

@@ -55,6 +55,7 @@ use glam::DVec3;
 
 use self::adjacency::{EdgeTable, Twins, face_of};
 use self::draft::Draft;
+use self::duplicate::Opposite;
 use self::outward::Part;
 use crate::mesh::geometry::Aabb;
 use crate::mesh::{Facet, Soup, Surface};
@@ -138,7 +139,7 @@ fn repair_once(
     if holes::fill_holes(&mut draft, &mut twins, params.fill_holes, diagonal, &mut stats, watch)? {
         parts = components::components(&draft, &twins);
     }
-    let (turned, cavities) = outward::orient_outward(&mut draft, &mut twins, &parts);
+    let (turned, cavities) = outward::orient_outward(&mut draft, &mut twins, &parts, params.keeps_bodies());
     (stats.components_turned, stats.cavities) = (turned, cavities);
     check_result(&draft, &stats, limit)?;
     Ok((carry::finish(&draft, soup, params.non_manifold == NonManifold::Seam), stats))
@@ -193,7 +194,8 @@ fn conform(soup: &Soup, params: &RepairParams, tolerance: f64, stats: &mut Repai
 
 /// Drops repeated faces; returns the table of the others.
 fn drop_duplicates(draft: &mut Draft, table: EdgeTable, params: &RepairParams, stats: &mut RepairStats) -> EdgeTable {
-    let duplicates = duplicate::drop_duplicates(draft, &table, params.non_manifold == NonManifold::Cut);
+    let opposite = Opposite { cancel: params.non_manifold == NonManifold::Cut, keep_walls: params.keeps_bodies() };
+    let duplicates = duplicate::drop_duplicates(draft, &table, opposite);
     stats.repeated_faces += duplicates.repeated;
     stats.cancelled_faces += duplicates.cancelled;
     let is_changed = duplicates.repeated + duplicates.cancelled > 0;
@@ -364,7 +366,7 @@ pub struct Step;
 
 impl crate::step::Step for Step {
     const NAME: &'static str = "repair";
-    const REVISION: u32 = 3;
+    const REVISION: u32 = 4;
     const INPUTS: &'static [InputDef] = &[InputDef {
         name: "from",
         accepts: &[Port::Soup, Port::Surface],

@@ -1,6 +1,7 @@
 //! Closed components look outward, and those inside an odd number of others inward: they bound cavities.
 //!
-//! Inside means the whole surface: a component that meets another one anywhere is not inside it, and looks outward.
+//! Inside means the whole surface: a component that meets another one anywhere is not inside it, and looks outward. Where
+//! bodies that touch stay apart it may have corners on the other one, as what fills a part of a cavity has.
 //! Nothing in a file tells a cavity from debris within the material, whichever way its faces look: both count as
 //! cavities, so that the inside of the result is well defined, and `keep-components` drops what is too small to be
 //! meant.
@@ -17,7 +18,7 @@ use super::orient::turn;
 use crate::mesh::bvh::{Primitive, TriangleBvh};
 use crate::mesh::geometry::Aabb;
 use crate::mesh::id::Face;
-use crate::mesh::predicate::triangle_triangle;
+use crate::mesh::predicate::{segment_triangle, triangle_triangle};
 use crate::mesh::{FaceId, IdVec};
 
 /// What is known of a component of the draft.
@@ -36,12 +37,12 @@ pub(super) struct Part {
 }
 
 /// Turns the components that look the wrong way; returns how many, and how many closed ones bound a cavity.
-pub(super) fn orient_outward(draft: &mut Draft, twins: &mut Twins, parts: &[Part]) -> (u64, u64) {
+pub(super) fn orient_outward(draft: &mut Draft, twins: &mut Twins, parts: &[Part], may_touch: bool) -> (u64, u64) {
     let mut chosen: IdVec<Face, bool> = IdVec::filled(false, draft.faces.len());
     let (mut turned, mut cavities) = (0, 0);
     let bodies: Vec<Body> = parts.iter().filter(|part| part.closed).map(Body::new).collect();
     for (i, &Body { part, .. }) in bodies.iter().enumerate() {
-        let is_cavity = depth(draft, &bodies, i) % 2 == 1;
+        let is_cavity = depth(draft, &bodies, i, may_touch) % 2 == 1;
         cavities += u64::from(is_cavity);
         let volume = volume(draft, part);
         if (volume < 0.0) != is_cavity && volume != 0.0 {
@@ -89,6 +90,15 @@ impl<'a> Body<'a> {
             && (outer.low != inner.low || outer.high != inner.high)
     }
 
+    /// Whether a point is on this body's surface.
+    fn is_at(&self, draft: &Draft, point: DVec3) -> bool {
+        let visit = |_, corners: &[DVec3; 3]| match segment_triangle([point; 2], *corners) {
+            true => ControlFlow::Break(()),
+            false => ControlFlow::Continue(()),
+        };
+        self.tree(draft).for_each_in(&Aabb::of([point]), visit).is_break()
+    }
+
     /// Whether no face of the component meets this body's surface.
     fn is_apart_from(&self, draft: &Draft, inner: &Part) -> bool {
         let tree = self.tree(draft);
@@ -110,14 +120,15 @@ impl<'a> Body<'a> {
 const PROBES: usize = 24;
 
 /// How many closed components contain this one.
-fn depth(draft: &Draft, bodies: &[Body<'_>], which: usize) -> usize {
+fn depth(draft: &Draft, bodies: &[Body<'_>], which: usize, may_touch: bool) -> usize {
     let inner = bodies[which].part;
     let stride = inner.faces.len().div_ceil(PROBES).max(1);
+    let stride = if may_touch { 1 } else { stride };
     let probes: Vec<DVec3> = inner.faces.iter().step_by(stride).map(|&f| draft.points[draft.faces[f][0]]).collect();
     let contains = |outer: &Body<'_>| {
-        outer.has_box_around(inner)
-            && probes.iter().all(|&p| is_inside(draft, outer, p))
-            && outer.is_apart_from(draft, inner)
+        let holds = |&p: &DVec3| is_inside(draft, outer, p);
+        let mut beside = probes.iter().filter(|p| !may_touch || !outer.is_at(draft, **p)).peekable();
+        outer.has_box_around(inner) && beside.peek().is_some() && beside.all(holds) && outer.is_apart_from(draft, inner)
     };
     bodies.iter().enumerate().filter(|&(i, outer)| i != which && contains(outer)).count()
 }

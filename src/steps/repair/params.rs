@@ -30,8 +30,9 @@ pub struct RepairParams {
     /// where they meet and drops what is inside of bodies, so that no two faces meet any more. Sheets are cut and stay.
     /// Faces that meet none keep their coordinates.
     pub self_intersections: SelfIntersections,
-    /// With `"remove"`, what becomes of bodies that run through or touch each other: `"keep"` (default) removes only
-    /// what runs through itself, `"union"` makes them one. Bodies inside of others that they do not touch stay.
+    /// With `"remove"`, what becomes of bodies that run through or touch each other: `"keep"` (default) leaves each one
+    /// by itself, and what two have in common to the one that comes first in the file, so that they touch at most;
+    /// `"union"` makes them one. Bodies inside of others that they do not touch stay.
     pub bodies: Bodies,
     /// Along how much, in all, faces of the result may run through each other; faces that lie on each other count with
     /// the area that they share over the diagonal. Where it is more, no finer mesh keeps to the same crossings: repair
@@ -56,6 +57,13 @@ impl Default for RepairParams {
             crossing_length: None,
             max_move: None,
         }
+    }
+}
+
+impl RepairParams {
+    /// Whether bodies are cut to lie beside each other.
+    pub(super) fn keeps_bodies(&self) -> bool {
+        self.self_intersections == SelfIntersections::Remove && self.bodies == Bodies::Keep
     }
 }
 
@@ -85,7 +93,7 @@ pub enum SelfIntersections {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Bodies {
-    /// Each is looked at by itself.
+    /// Each stays one by itself; what they have in common is of the first.
     #[default]
     Keep,
     /// They become one.

@@ -53,27 +53,6 @@ impl Part {
         part
     }
 
-    /// All faces of a surface, as they are.
-    pub fn whole(surface: &Surface) -> Self {
-        Self {
-            points: surface.points.as_slice().to_vec(),
-            vertices: surface.points.ids().map(Some).collect(),
-            faces: surface.faces.iter().map(|face| face.map(VertexId::raw)).collect(),
-            origin: surface.faces.ids().collect(),
-            reach: 0.0,
-        }
-    }
-
-    /// Adds pieces of another surface, whose vertices and faces are these of this one.
-    pub fn append(&mut self, other: Self, vertices: &[VertexId], faces: &[FaceId]) {
-        let base = self.points.len() as u32;
-        self.points.extend(other.points);
-        self.vertices.extend(other.vertices.into_iter().map(|v| v.map(|v| vertices[v.index()])));
-        self.faces.extend(other.faces.into_iter().map(|face| face.map(|v| v + base)));
-        self.origin.extend(other.origin.into_iter().map(|f| faces[f.index()]));
-        self.reach = self.reach.max(other.reach);
-    }
-
     /// The pieces with all that the surface carries.
     pub fn to_soup(&self, surface: &Surface) -> Soup {
         let faces = self.faces.iter().map(|face| Facet::Tri(face.map(VertexId::from_raw))).collect();

@@ -4,14 +4,16 @@
 //! Round an edge the front or back of each piece looks at that of the next one; what looks at each other belongs to one
 //! cell. The order round an edge of more than two is that of normals turned about it, which is decided exactly: all are
 //! normals of faces through the edge's line. Through a piece the winding number changes by how many bodies' faces lie
-//! there and which way they look. One number of each connected set of pieces is measured: the solid angle of all bodies
+//! there and which way they look; each body has a number of its own. One number of each connected set of pieces is measured: the solid angle of all bodies
 //! seen from the middle of a piece (A. Jacobson, L. Kavan, O. Sorkine-Hornung. Robust inside-outside segmentation using
 //! generalized winding numbers. SIGGRAPH 2013) is the mean of the numbers on its two sides, and must come out as one.
 
 use std::cmp::Ordering;
+use std::collections::BTreeMap;
 
 use glam::DVec3;
 use rayon::prelude::*;
+use smallvec::SmallVec;
 
 use super::exact::{NONE, Plane};
 use super::meet::Meetings;
@@ -33,21 +35,38 @@ pub(super) struct Complex<'a> {
     pub(super) meetings: &'a Meetings,
     /// The touched face of each face, or [`NONE`].
     pub(super) touched: Vec<u32>,
-    /// Whether a face of the mesh bounds a body.
-    pub(super) is_solid: Vec<bool>,
+    /// The body that each face of the mesh bounds, or [`NONE`] for sheets.
+    pub(super) body: Vec<u32>,
 }
 
-/// Bodies as faces.
-pub(super) struct Body {
+/// A closed shell as faces, and the body that it bounds, perhaps with others.
+pub(super) struct Shell {
+    pub(super) body: u32,
     pub(super) bounds: Aabb,
     pub(super) faces: Vec<(u32, [DVec3; 3])>,
 }
 
-/// Winding numbers before and behind each piece; `None` where no piece that is connected with it was cut.
-pub(super) type Windings = Vec<Option<[i32; 2]>>;
+/// Winding numbers that are not 0, by body.
+type Inside = SmallVec<[(u32, i32); 2]>;
 
-/// The winding numbers of all pieces that are connected with touched faces.
-pub(super) fn windings(complex: &Complex<'_>, bodies: &[Body]) -> Result<Windings, Fault> {
+fn sum(one: &Inside, other: &Inside) -> Inside {
+    let mut all: Inside = one.iter().chain(other).copied().collect();
+    all.sort_unstable();
+    all.dedup_by(|next, known| {
+        let is_same = next.0 == known.0;
+        known.1 += if is_same { next.1 } else { 0 };
+        is_same
+    });
+    all.retain(|(_, number)| *number != 0);
+    all
+}
+
+/// The first body that is before and behind each piece, or [`NONE`]; `None` where no piece that is connected with it
+/// was cut.
+pub(super) type Owners = Vec<Option<[u32; 2]>>;
+
+/// The bodies at all pieces that are connected with touched faces.
+pub(super) fn owners(complex: &Complex<'_>, shells: &[Shell]) -> Result<Owners, Fault> {
     let uses = complex.uses();
     let mut sets = Sets::new(complex.pieces.len());
     for same in groups(&uses) {
@@ -68,16 +87,20 @@ pub(super) fn windings(complex: &Complex<'_>, bodies: &[Body]) -> Result<Winding
     }
     let connected: Vec<Vec<u32>> = sets.members().into_iter().filter(|set| is_met[set[0] as usize]).collect();
     let mut found = vec![None; complex.pieces.len()];
-    let mut of_cell: Vec<Option<i32>> = vec![None; 2 * complex.pieces.len()];
+    let mut of_cell: Vec<Option<Inside>> = vec![None; 2 * complex.pieces.len()];
     for set in connected {
-        complex.spread(&set, bodies, &mut sides, &mut of_cell)?;
+        complex.spread(&set, shells, &mut sides, &mut of_cell)?;
         for p in set {
-            let number = |side: u32, sides: &mut Sets| of_cell[sides.find(2 * p + side) as usize];
-            let both = number(0, &mut sides).zip(number(1, &mut sides)).ok_or(Fault::Inconsistent)?;
+            let owner = |side: u32, sides: &mut Sets| of_cell[sides.find(2 * p + side) as usize].as_ref().map(owner);
+            let both = owner(0, &mut sides).zip(owner(1, &mut sides)).ok_or(Fault::Inconsistent)?;
             found[p as usize] = Some([both.0, both.1]);
         }
     }
     Ok(found)
+}
+
+fn owner(inside: &Inside) -> u32 {
+    inside.iter().find(|(_, number)| *number >= 1).map_or(NONE, |&(body, _)| body)
 }
 
 fn groups(uses: &[Use]) -> impl Iterator<Item = &[Use]> {
@@ -158,10 +181,11 @@ impl Complex<'_> {
         }
     }
 
-    /// How much higher the winding number is behind a piece than before it.
-    pub(super) fn step(&self, piece: u32) -> i32 {
+    /// How much higher winding numbers are behind a piece than before it.
+    fn step(&self, piece: u32) -> Inside {
         let members = self.pieces[piece as usize].members.iter();
-        members.filter(|(f, _)| self.is_solid[*f as usize]).map(|&(_, sign)| i32::from(sign)).sum()
+        let steps = members.map(|&(f, sign)| (self.body[f as usize], i32::from(sign)));
+        sum(&steps.filter(|(body, _)| *body != NONE).collect(), &Inside::new())
     }
 
     pub(super) fn corners(&self, piece: u32) -> [DVec3; 3] {
@@ -169,28 +193,36 @@ impl Complex<'_> {
     }
 
     /// Numbers all cells at a connected set of pieces.
-    fn spread(&self, set: &[u32], bodies: &[Body], sides: &mut Sets, of_cell: &mut [Option<i32>]) -> Result<(), Fault> {
-        let mut steps: Vec<(u32, u32, i32)> = Vec::with_capacity(2 * set.len());
+    fn spread(
+        &self,
+        set: &[u32],
+        shells: &[Shell],
+        sides: &mut Sets,
+        of_cell: &mut [Option<Inside>],
+    ) -> Result<(), Fault> {
+        let mut steps: Vec<(u32, u32, Inside)> = Vec::with_capacity(2 * set.len());
         for &p in set {
             let (front, back, step) = (sides.find(2 * p), sides.find(2 * p + 1), self.step(p));
-            steps.extend([(front, back, step), (back, front, -step)]);
+            let turned = step.iter().map(|&(body, number)| (body, -number)).collect();
+            steps.extend([(front, back, step), (back, front, turned)]);
         }
         steps.sort_unstable();
         steps.dedup();
-        let (first, number) = self.measured(set, bodies)?;
+        let (first, inside) = self.measured(set, shells)?;
         let start = sides.find(2 * first);
-        of_cell[start as usize] = Some(number);
+        of_cell[start as usize] = Some(inside);
         let mut open = vec![start];
         while let Some(cell) = open.pop() {
-            let number = of_cell[cell as usize].ok_or(Fault::Inconsistent)?;
+            let inside = of_cell[cell as usize].clone().ok_or(Fault::Inconsistent)?;
             let from = steps.partition_point(|step| step.0 < cell);
-            for &(_, other, step) in steps[from..].iter().take_while(|step| step.0 == cell) {
-                match of_cell[other as usize] {
+            for (_, other, step) in steps[from..].iter().take_while(|step| step.0 == cell) {
+                let there = sum(&inside, step);
+                match &of_cell[*other as usize] {
                     None => {
-                        of_cell[other as usize] = Some(number + step);
-                        open.push(other);
+                        of_cell[*other as usize] = Some(there);
+                        open.push(*other);
                     }
-                    Some(known) if known != number + step => return Err(Fault::Inconsistent),
+                    Some(known) if *known != there => return Err(Fault::Inconsistent),
                     Some(_) => {}
                 }
             }
@@ -198,25 +230,39 @@ impl Complex<'_> {
         Ok(())
     }
 
-    /// A piece, and the winding number before it: the first of the largest ones where the measure is beyond doubt.
-    fn measured(&self, set: &[u32], bodies: &[Body]) -> Result<(u32, i32), Fault> {
+    /// A piece, and the winding numbers before it: the first of the largest ones where the measure is beyond doubt.
+    fn measured(&self, set: &[u32], shells: &[Shell]) -> Result<(u32, Inside), Fault> {
         let mut by_size: Vec<(f64, u32)> = set.iter().map(|&p| (triangle_area(self.corners(p)), p)).collect();
         by_size.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-        for &(_, piece) in by_size.iter().take(TRIES) {
-            let middle = self.corners(piece).iter().sum::<DVec3>() / 3.0;
-            let own = &self.pieces[piece as usize].members;
-            let seen = |body: &Body| {
-                let others = body.faces.iter().filter(|(f, _)| own.iter().all(|(member, _)| member != f));
-                others.map(|(_, corners)| solid_angle(corners.map(|p| p - middle))).sum::<f64>()
-            };
-            let around = bodies.iter().filter(|body| body.bounds.contains(middle));
-            let mean = around.map(seen).sum::<f64>() / (4.0 * std::f64::consts::PI);
-            let before = mean - 0.5 * f64::from(self.step(piece));
-            if (before - before.round()).abs() < DOUBT {
-                return Ok((piece, before.round() as i32));
-            }
+        let tried = by_size.iter().take(TRIES).map(|&(_, piece)| piece);
+        let mut certain = tried.filter_map(|piece| Some((piece, self.before(piece, shells)?)));
+        certain.next().ok_or(Fault::Inconsistent)
+    }
+
+    /// The winding numbers before a piece, as measured; `None` in doubt.
+    fn before(&self, piece: u32, shells: &[Shell]) -> Option<Inside> {
+        let middle = self.corners(piece).iter().sum::<DVec3>() / 3.0;
+        let own = &self.pieces[piece as usize].members;
+        let seen = |shell: &Shell| {
+            let others = shell.faces.iter().filter(|(f, _)| own.iter().all(|(member, _)| member != f));
+            others.map(|(_, corners)| solid_angle(corners.map(|p| p - middle))).sum::<f64>()
+        };
+        let step = self.step(piece);
+        let mut angles: BTreeMap<u32, f64> = step.iter().map(|&(body, _)| (body, 0.0)).collect();
+        for shell in shells.iter().filter(|shell| shell.bounds.contains(middle)) {
+            *angles.entry(shell.body).or_default() += seen(shell);
         }
-        Err(Fault::Inconsistent)
+        let mut inside = Inside::new();
+        for (body, angle) in angles {
+            let own = step.iter().find(|own| own.0 == body).map_or(0, |own| own.1);
+            let number = angle / (4.0 * std::f64::consts::PI) - 0.5 * f64::from(own);
+            if (number - number.round()).abs() >= DOUBT {
+                return None;
+            }
+            inside.push((body, number.round() as i32));
+        }
+        inside.retain(|(_, number)| *number != 0);
+        Some(inside)
     }
 }
 
@@ -227,7 +273,7 @@ const DOUBT: f64 = 0.01;
 
 /// The solid angle of a triangle seen from the origin, above 0 from behind (A. Van Oosterom, J. Strackee. The solid
 /// angle of a plane triangle. IEEE Trans. Biomed. Eng. 30(2), 1983).
-fn solid_angle([a, b, c]: [DVec3; 3]) -> f64 {
+pub(super) fn solid_angle([a, b, c]: [DVec3; 3]) -> f64 {
     let [x, y, z] = [a, b, c].map(DVec3::length);
     let below = x * y * z + a.dot(b) * z + b.dot(c) * x + c.dot(a) * y;
     2.0 * libm::atan2(a.dot(b.cross(c)), below)

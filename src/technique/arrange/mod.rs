@@ -6,8 +6,9 @@
 //!    exactly (`exact`, on integers of fixed width, `wide`).
 //! 3. Each face is cut along its segments, faces that lie on each other together (`flat`, `triangulate`).
 //! 4. The pieces bound cells of space, each with a winding number (`cells`). Bodies are where it is at least one: the
-//!    pieces between inside and outside stay, looking outward, and the others go. Sheets, which have a border, stay as
-//!    they are, cut along where they pass through others.
+//!    pieces between inside and outside stay, looking outward, and the others go. Where bodies are to stay apart each
+//!    has its own number, a cell is of the first body that it is in, and a piece between two bodies bounds both.
+//!    Sheets, which have a border, stay as they are, cut along where they pass through others.
 //! 5. Points are rounded to floats, which may let pieces meet again: the caller finds out and goes on with a coarser
 //!    grid, so that what is closer than that becomes one.
 //!
@@ -91,12 +92,27 @@ pub struct Resolved {
     pub touched: usize,
 }
 
+/// What becomes of bodies that have a part of space in common.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Shared {
+    /// All bodies are one.
+    United,
+    /// It is of the body whose faces come first, and the others end there: each bounds what is left of it.
+    First,
+}
+
 /// Cuts the faces of a surface that meet others, which are given, and drops what is inside of bodies. The grid has so
 /// many bits less than the finest one.
 ///
 /// # Errors
 /// [`Fault`]: interrupted, too many meetings, or contradictions.
-pub fn resolve(surface: &Surface, meeting: &[u32], coarser: u32, watch: &Watch) -> Result<Resolved, Fault> {
+pub fn resolve(
+    surface: &Surface,
+    meeting: &[u32],
+    shared: Shared,
+    coarser: u32,
+    watch: &Watch,
+) -> Result<Resolved, Fault> {
     let grid = Grid::new(&Aabb::of(surface.points.iter().copied()), coarser);
     let mut mesh = Mesh {
         points: surface.points.as_slice().to_vec(),
@@ -107,11 +123,15 @@ pub fn resolve(surface: &Surface, meeting: &[u32], coarser: u32, watch: &Watch) 
     let mut meetings = Meetings::new(&mesh, &snapped.touched, &snapped.pairs, &grid)?;
     watch.check()?;
     let cut = flat::cut_faces(&mut meetings, watch)?;
-    let complex = assemble(surface, &mesh, &snapped.touched, &meetings, cut, &grid);
+    let body = extract::body_of_faces(surface, shared == Shared::First);
+    let complex = assemble(&body, &mesh, &snapped.touched, &meetings, cut, &grid);
     watch.check()?;
-    let bodies = extract::bodies(surface, &mesh);
-    let windings = cells::windings(&complex, &bodies)?;
-    let chosen = extract::choose(&complex, &windings);
+    let shells = extract::shells(surface, &mesh, &body);
+    let owners = cells::owners(&complex, &shells)?;
+    let mut chosen = extract::choose(&complex, &owners);
+    if shared == Shared::First {
+        chosen.sort(&mesh.origin);
+    }
     let part = |faces: &[extract::Chosen]| Part::new(&complex, &mesh.origin, faces, 4.0 * grid.unit);
     Ok(Resolved {
         kept: part(&chosen.kept),
@@ -123,7 +143,7 @@ pub fn resolve(surface: &Surface, meeting: &[u32], coarser: u32, watch: &Watch) 
 
 /// All pieces, those of faces that meet none among them.
 fn assemble<'a>(
-    surface: &Surface,
+    body: &[u32],
     mesh: &Mesh,
     touched: &[bool],
     meetings: &'a Meetings,
@@ -146,7 +166,6 @@ fn assemble<'a>(
     meetings.face_of.iter().enumerate().for_each(|(number, &f)| numbers[f as usize] = number as u32);
     let mut places = mesh.points.clone();
     places.extend((0..meetings.points.len() as u32).map(|p| grid.place(meetings.points[p].at)));
-    let is_closed = extract::closed_faces(surface);
-    let is_solid = mesh.origin.iter().map(|&f| is_closed[f as usize]).collect();
-    Complex { pieces, places, vertices, meetings, touched: numbers, is_solid }
+    let body = mesh.origin.iter().map(|&f| body[f as usize]).collect();
+    Complex { pieces, places, vertices, meetings, touched: numbers, body }
 }

@@ -157,15 +157,18 @@ struct State {
 }
 
 impl State {
-    /// Snaps touched faces, and whichever these meet then.
+    /// Snaps touched faces, and whichever these meet, before or then.
     fn spread(&mut self, mesh: &mut Mesh, touched: &mut [bool], watch: &Watch) -> Result<(), Fault> {
         let margin = self.grid.unit;
         let tree = TriangleBvh::new(mesh.triangles());
+        let mut looked = vec![false; mesh.faces.len()];
         loop {
             let moved = self.move_corners(mesh, touched);
-            let concerned: Vec<u32> = (0..mesh.faces.len() as u32)
-                .filter(|&f| mesh.faces[f as usize].iter().any(|&v| moved[v as usize]))
-                .collect();
+            let is_moved = |f: usize| mesh.faces[f].iter().any(|&v| moved[v as usize]);
+            let is_new = |f: usize| touched[f] && !looked[f];
+            let concerned: Vec<u32> =
+                (0..mesh.faces.len()).filter(|&f| is_moved(f) || is_new(f)).map(|f| f as u32).collect();
+            concerned.iter().for_each(|&f| looked[f as usize] = true);
             let mesh = &*mesh;
             let found = search(
                 &concerned,

@@ -29,9 +29,13 @@ fn surface_of(bodies: &[Vec<Triangle>]) -> Surface {
 }
 
 fn resolved(surface: &Surface) -> Resolved {
+    resolved_as(surface, Shared::United)
+}
+
+fn resolved_as(surface: &Surface, shared: Shared) -> Resolved {
     let found = self_intersections(&surface.to_soup(), &Watch::silent()).expect("nobody interrupts");
     let meeting: Vec<u32> = faces_of(&found.pairs).into_iter().map(crate::mesh::Id::raw).collect();
-    resolve(surface, &meeting, 0, &Watch::silent()).expect("a result")
+    resolve(surface, &meeting, shared, 0, &Watch::silent()).expect("a result")
 }
 
 /// What stays, without what it carries.
@@ -148,6 +152,25 @@ proptest! {
         prop_assume!(left.determinant().abs() > 0.05 && right.determinant().abs() > 0.05);
         let (a, b) = (body(shapes[0], left, vector(&x[18..])), body(shapes[1], right, vector(&x[21..])));
         check_union(&a, &b, common_volume(&a, &b));
+    }
+
+    #[test]
+    fn convex_bodies_come_apart(x in numbers(24), shapes in any::<[bool; 2]>()) {
+        let map = |x: &[f64]| DMat3::from_cols(vector(x), vector(&x[3..]), vector(&x[6..])) + DMat3::IDENTITY;
+        let (left, right) = (map(&x), map(&x[9..]));
+        prop_assume!(left.determinant().abs() > 0.05 && right.determinant().abs() > 0.05);
+        let (a, b) = (body(shapes[0], left, vector(&x[18..])), body(shapes[1], right, vector(&x[21..])));
+        let common = common_volume(&a, &b);
+        let result = resolved_as(&surface_of(&[a.clone(), b.clone()]), Shared::First);
+        prop_assert!(is_closed(&soup(&result)));
+        let found = self_intersections(&soup(&result), &Watch::silent()).expect("nobody interrupts");
+        prop_assert_eq!(found.crossing().count(), 0);
+        // All faces of the first body, which is whole, come before those of the other one.
+        let faces = corners(&result);
+        let whole = volume(&a);
+        prop_assert!((1..=faces.len()).any(|count| (volume(&faces[..count]) - whole).abs() < 1e-6 * whole));
+        let all = volume(&faces);
+        prop_assert!((all - (volume(&a) + volume(&b) - common)).abs() < 1e-6 * all, "{} {}", all, common);
     }
 
     #[test]
