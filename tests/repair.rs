@@ -1,5 +1,7 @@
 //! Repair on small meshes with one defect each: exact counts, and the promises of the step.
 
+#[path = "repair/gaps.rs"]
+mod gaps;
 #[path = "repair/refused.rs"]
 mod refused;
 #[path = "repair/solid.rs"]

@@ -2,11 +2,12 @@
 //!
 //! # Algorithm
 //! Quads are split. Vertices at the same place are welded, then open vertices within a tolerance; collapsed and
-//! repeated faces go. At every edge with more than two faces these are joined in pairs by their order round the edge,
-//! and each vertex gets one copy for each fan of faces, which makes the mesh a manifold by construction. Neighbours
-//! are turned until they agree (a Möbius strip is cut), closed components until they look outward, and those that
-//! bound a cavity inward. Wanted holes are filled with the least bend, refined and faired like their surroundings.
-//! Faces that run through each other are cut where they meet, if wanted, and what is inside of bodies goes.
+//! repeated faces go. Cracks that are wider are zipped, if wanted. At every edge with more than two faces these are
+//! joined in pairs by their order round the edge, and each vertex gets one copy for each fan of faces, which makes the
+//! mesh a manifold by construction. Neighbours are turned until they agree (a Möbius strip is cut), closed components
+//! until they look outward, and those that bound a cavity inward. Wanted holes are filled with the least bend, refined
+//! and faired like their surroundings. Faces that run through each other are cut where they meet, if wanted, and what
+//! is inside of bodies goes.
 //!
 //! Based on: Guéziec, Taubin, Lazarus, Horn. Cutting and stitching: converting sets of polygons to manifold surfaces.
 //! IEEE Transactions on Visualization and Computer Graphics 7(2), 2001.
@@ -47,6 +48,7 @@ mod report;
 mod solid;
 mod tjunction;
 mod weld;
+mod zip;
 
 pub use params::{Bodies, FillHoles, KeepComponents, NonManifold, RepairParams, SelfIntersections};
 pub use report::{ComponentStats, LoopFate, LoopStats, RemovalStats, RepairError, RepairStats};
@@ -82,7 +84,8 @@ pub fn repair_and_remove(
 ) -> Result<(Surface, Soup, RepairStats), RepairError> {
     let diagonal = check_input(soup)?;
     check_arithmetic(soup, diagonal)?;
-    let limit = params.max_move.unwrap_or(params.weld).resolve(diagonal);
+    let widest = params.gaps.map_or(0.0, |gaps| gaps.resolve(diagonal));
+    let limit = params.max_move.map_or(params.weld.resolve(diagonal).max(widest), |most| most.resolve(diagonal));
     let tolerance = params.weld.resolve(diagonal).min(limit);
     let (mut surface, mut stats) = settle(soup, params, tolerance, limit, watch)?;
     watch.check()?;
@@ -111,7 +114,7 @@ fn settle(
 ) -> Result<(Surface, RepairStats), RepairError> {
     let (mut surface, mut stats) = repair_once(soup, params, tolerance, limit, watch)?;
     let cut = stats.vertex_copies + stats.repeated_faces + stats.cancelled_faces + stats.slivers_dropped;
-    let mut unsettled = cut + stats.t_junctions > 0;
+    let mut unsettled = cut + stats.t_junctions + stats.vertices_zipped > 0;
     while unsettled && stats.rounds < ROUNDS {
         let rest = (limit - stats.max_move).max(0.0);
         let (again, more) = repair_once(&surface.to_soup(), params, tolerance.min(rest), rest, watch)?;
@@ -131,7 +134,7 @@ fn repair_once(
     watch: &Watch,
 ) -> Result<(Surface, RepairStats), RepairError> {
     let mut stats = RepairStats::default();
-    let mut draft = conform(soup, params, tolerance, &mut stats);
+    let mut draft = conform(soup, params, (tolerance, limit), &mut stats);
     watch.check()?;
     let mut twins = make_clean_manifold(&mut draft, soup, params, limit, &mut stats, watch)?;
     let mut parts = choose_components(&mut draft, &mut twins, params, &mut stats)?;
@@ -172,7 +175,7 @@ fn check_arithmetic(soup: &Soup, extent: f64) -> Result<(), RepairError> {
 }
 
 /// Triangles that share vertices wherever they touch.
-fn conform(soup: &Soup, params: &RepairParams, tolerance: f64, stats: &mut RepairStats) -> Draft {
+fn conform(soup: &Soup, params: &RepairParams, (tolerance, limit): (f64, f64), stats: &mut RepairStats) -> Draft {
     let mut draft = draft::triangulate_and_weld_exactly(soup);
     stats.quads_split = soup.faces.iter().filter(|facet| matches!(facet, Facet::Quad(_))).count() as u64;
     stats.vertices_merged = (soup.points.len() - draft.points.len()) as u64;
@@ -189,7 +192,23 @@ fn conform(soup: &Soup, params: &RepairParams, tolerance: f64, stats: &mut Repai
     let table = drop_duplicates(&mut draft, table, params, stats);
     let closed = tjunction::close_t_junctions(&mut draft, &table, tolerance - welded.shift);
     (stats.t_junctions, stats.max_move) = (closed.vertices, welded.shift + closed.distance);
+    if let Some(width) = params.gaps {
+        let width = width.resolve(bounds(&draft).diagonal()).min(limit - stats.max_move);
+        zip_gaps(&mut draft, width, stats);
+    }
     draft
+}
+
+fn bounds(draft: &Draft) -> Aabb {
+    Aabb::of(draft.faces.iter().flatten().map(|&v| draft.points[v]))
+}
+
+fn zip_gaps(draft: &mut Draft, width: f64, stats: &mut RepairStats) {
+    stats.collapsed_faces += duplicate::drop_collapsed(draft);
+    let table = EdgeTable::new(&draft.faces, draft.points.len());
+    let zipped = zip::zip(draft, &table, width);
+    stats.vertices_zipped = zipped.vertices;
+    stats.max_move += zipped.distance;
 }
 
 /// Drops repeated faces; returns the table of the others.
@@ -342,7 +361,8 @@ fn count_intersections(
     if let Some(longest) = longest {
         after.check_length(longest, |f| surface.corners(f))?;
     }
-    let changes = stats.vertices_welded + stats.t_junctions + stats.edges_collapsed + stats.edges_flipped;
+    let changes =
+        stats.vertices_welded + stats.t_junctions + stats.vertices_zipped + stats.edges_collapsed + stats.edges_flipped;
     let dropped = stats.repeated_faces + stats.cancelled_faces + stats.slivers_dropped + stats.components_dropped;
     let added = stats.faces_filled + stats.double_edges_split + stats.removal.as_ref().map_or(0, |all| all.rounds);
     let before = if changes + dropped + added == 0 {

@@ -1,7 +1,7 @@
 //! Closed components look outward, and those inside an odd number of others inward: they bound cavities.
 //!
-//! Inside means the whole surface: a component that meets another one anywhere is not inside it, and looks outward. Where
-//! bodies that touch stay apart it may have corners on the other one, as what fills a part of a cavity has.
+//! Inside means the whole surface: a component that meets another one anywhere is not inside it, and looks outward.
+//! Where bodies that touch stay apart it may have corners on the other one, as what fills a part of a cavity has.
 //! Nothing in a file tells a cavity from debris within the material, whichever way its faces look: both count as
 //! cavities, so that the inside of the result is well defined, and `keep-components` drops what is too small to be
 //! meant.
@@ -92,9 +92,9 @@ impl<'a> Body<'a> {
 
     /// Whether a point is on this body's surface.
     fn is_at(&self, draft: &Draft, point: DVec3) -> bool {
-        let visit = |_, corners: &[DVec3; 3]| match segment_triangle([point; 2], *corners) {
-            true => ControlFlow::Break(()),
-            false => ControlFlow::Continue(()),
+        let visit = |_, corners: &[DVec3; 3]| {
+            let is_here = segment_triangle([point; 2], *corners);
+            if is_here { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         };
         self.tree(draft).for_each_in(&Aabb::of([point]), visit).is_break()
     }

@@ -17,6 +17,11 @@ pub struct RepairParams {
     /// Vertices on open edges move onto a vertex within this length, and onto an open edge within it. Length;
     /// default `"0.0001%"`. Vertices at exactly the same place are always one.
     pub weld: Length,
+    /// Cracks up to this width are zipped: borders that run beside each other meet in the middle, where each lies as
+    /// the other one's face would go on. Nothing else is joined, so that this may be far larger than `weld`. Length;
+    /// default: not done.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub gaps: Option<Length>,
     /// Which holes are filled: `"none"` (default), `"all"`, or those whose rim is no longer than this length. A rim
     /// whose fill would fold back onto the surface, as the outline of a plate, stays open.
     pub fill_holes: FillHoles,
@@ -40,7 +45,7 @@ pub struct RepairParams {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub crossing_length: Option<Length>,
     /// The surface moves no further than this outside filled holes, by all corrections together. Length; default: the
-    /// weld length.
+    /// weld length, or `gaps` where that is larger.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub max_move: Option<Length>,
 }
@@ -49,6 +54,7 @@ impl Default for RepairParams {
     fn default() -> Self {
         Self {
             weld: Length::Percent(1e-4),
+            gaps: None,
             fill_holes: FillHoles::None,
             keep_components: KeepComponents::All,
             non_manifold: NonManifold::Cut,

@@ -30,6 +30,9 @@ pub struct RepairStats {
     pub cancelled_faces: u64,
     /// Vertices that were put on an open edge they lay beside.
     pub t_junctions: u64,
+    /// Vertices of borders beside each other that were joined, or put on the edge across, to close gaps.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub vertices_zipped: u64,
     /// Edges with more than two faces before welding within a tolerance.
     pub non_manifold_edges_read: u64,
     /// Edges with more than two faces after it: a higher number means that the weld length is too large.
@@ -139,6 +142,7 @@ impl RepairStats {
         self.repeated_faces += more.repeated_faces;
         self.cancelled_faces += more.cancelled_faces;
         self.t_junctions += more.t_junctions;
+        self.vertices_zipped += more.vertices_zipped;
         self.double_edges_split += more.double_edges_split;
         self.faces_turned += more.faces_turned;
         self.components_turned += more.components_turned;

@@ -22,8 +22,13 @@ pub(super) struct Closed {
 pub(super) fn close_t_junctions(draft: &mut Draft, table: &EdgeTable, tolerance: f64) -> Closed {
     let open: Vec<HalfedgeId> =
         table.edges().filter(|(_, _, group)| group.len() == 1).map(|(_, _, group)| group[0].1).collect();
-    let mut closed = Closed::default();
-    let mut hits = junctions(draft, table, &open, tolerance);
+    let hits = junctions(draft, table, &open, tolerance);
+    let distance = hits.iter().map(|hit| hit.distance).fold(0.0, f64::max);
+    Closed { vertices: split_edges(draft, hits), distance }
+}
+
+/// Puts vertices on open edges; the face at each becomes a fan. Returns how many there are.
+pub(super) fn split_edges(draft: &mut Draft, mut hits: Vec<Hit>) -> u64 {
     hits.sort_by(|a, b| face_of(a.edge).cmp(&face_of(b.edge)).then(a.edge.cmp(&b.edge)).then(a.at.total_cmp(&b.at)));
     let mut keep = vec![true; draft.faces.len()];
     for at_face in hits.chunk_by(|a, b| face_of(a.edge) == face_of(b.edge)) {
@@ -35,8 +40,6 @@ pub(super) fn close_t_junctions(draft: &mut Draft, table: &EdgeTable, tolerance:
             let rest = edge_key(from, head(&draft.faces, hit.edge));
             draft.splits.entry(rest).or_default().push(hit.vertex);
             side.push(hit.vertex);
-            closed.vertices += 1;
-            closed.distance = closed.distance.max(hit.distance);
         }
         keep[face.index()] = false;
         let (corners, origin) = (draft.faces[face], draft.origin[face]);
@@ -45,19 +48,22 @@ pub(super) fn close_t_junctions(draft: &mut Draft, table: &EdgeTable, tolerance:
             keep.push(true);
         }
     }
-    if closed.vertices > 0 {
+    if !hits.is_empty() {
         draft.retain_faces(&keep);
     }
-    closed
+    hits.len() as u64
 }
 
 /// A vertex beside an edge.
-struct Hit {
-    edge: HalfedgeId,
+pub(super) struct Hit {
+    /// The edge.
+    pub(super) edge: HalfedgeId,
     /// Where along the edge, from 0 to 1.
-    at: f64,
-    vertex: VertexId,
-    distance: f64,
+    pub(super) at: f64,
+    /// The vertex.
+    pub(super) vertex: VertexId,
+    /// How far the surface moves.
+    pub(super) distance: f64,
 }
 
 fn junctions(draft: &Draft, table: &EdgeTable, open: &[HalfedgeId], tolerance: f64) -> Vec<Hit> {

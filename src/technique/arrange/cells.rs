@@ -4,9 +4,10 @@
 //! Round an edge the front or back of each piece looks at that of the next one; what looks at each other belongs to one
 //! cell. The order round an edge of more than two is that of normals turned about it, which is decided exactly: all are
 //! normals of faces through the edge's line. Through a piece the winding number changes by how many bodies' faces lie
-//! there and which way they look; each body has a number of its own. One number of each connected set of pieces is measured: the solid angle of all bodies
-//! seen from the middle of a piece (A. Jacobson, L. Kavan, O. Sorkine-Hornung. Robust inside-outside segmentation using
-//! generalized winding numbers. SIGGRAPH 2013) is the mean of the numbers on its two sides, and must come out as one.
+//! there and which way they look; each body has a number of its own. One number of each connected set of pieces is
+//! measured: the solid angle of all bodies seen from the middle of a piece (A. Jacobson, L. Kavan, O. Sorkine-Hornung.
+//! Robust inside-outside segmentation using generalized winding numbers. SIGGRAPH 2013) is the mean of the numbers on
+//! its two sides, and must come out as one.
 
 use std::cmp::Ordering;
 use std::collections::BTreeMap;

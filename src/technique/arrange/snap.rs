@@ -168,7 +168,9 @@ impl State {
             let is_new = |f: usize| touched[f] && !looked[f];
             let concerned: Vec<u32> =
                 (0..mesh.faces.len()).filter(|&f| is_moved(f) || is_new(f)).map(|f| f as u32).collect();
-            concerned.iter().for_each(|&f| looked[f as usize] = true);
+            for &f in &concerned {
+                looked[f as usize] = true;
+            }
             let mesh = &*mesh;
             let found = search(
                 &concerned,
