@@ -89,6 +89,7 @@ pub fn recipe_schema(catalog: &[StepDef], endings: &[&str]) -> Value {
                 "description": "Standards for elements by name; a gate names one with `criteria`.",
                 "additionalProperties": { "$ref": "#/definitions/Criteria" }
             },
+            "limits": limits(),
             "outputs": {
                 "type": "object",
                 "description": "By step, the files written of it.",
@@ -245,6 +246,31 @@ fn keep_used(definitions: &mut Map<String, Value>, steps: &[Value]) {
         }
     }
     definitions.retain(|name, _| used.contains(name));
+}
+
+fn limits() -> Value {
+    let timeout = json!({
+        "description": "How long a step may take: seconds, or such as \"90 s\", \"10 min\", \"2 h\". Metrics and gates take as \
+            long as they take.",
+        "anyOf": [{ "type": "number", "exclusiveMinimum": 0 }, { "type": "string" }]
+    });
+    json!({
+        "type": "object",
+        "description": "Limits of every step; one that is over its limit fails, and the others go on.",
+        "additionalProperties": false,
+        "properties": {
+            "timeout": timeout,
+            "steps": {
+                "type": "object",
+                "description": "By step, its own limits; `timeout = false` for none.",
+                "additionalProperties": {
+                    "type": "object",
+                    "additionalProperties": false,
+                    "properties": { "timeout": { "anyOf": [timeout, { "const": false }] } }
+                }
+            }
+        }
+    })
 }
 
 fn gate() -> Value {

@@ -21,6 +21,7 @@ pub trait Progress: Send + Sync {
 pub struct Watch {
     progress: Option<Arc<dyn Progress>>,
     cancelled: Arc<AtomicBool>,
+    expired: Option<Arc<AtomicBool>>,
 }
 
 impl std::fmt::Debug for Watch {
@@ -37,13 +38,20 @@ impl Watch {
 
     /// A watch that reports to `progress` and is cancelled when `cancelled` becomes true.
     pub fn new(progress: Arc<dyn Progress>, cancelled: Arc<AtomicBool>) -> Self {
-        Self { progress: Some(progress), cancelled }
+        Self { progress: Some(progress), cancelled, expired: None }
+    }
+
+    /// The same watch, cancelled too when `expired` becomes true: the time of one task is up, and the run goes on.
+    #[must_use]
+    pub fn limited(&self, expired: Arc<AtomicBool>) -> Self {
+        Self { expired: Some(expired), ..self.clone() }
     }
 
     /// Whether somebody wants the step to stop.
     #[inline]
     pub fn is_cancelled(&self) -> bool {
-        self.cancelled.load(Ordering::Relaxed)
+        let is_set = |flag: &Arc<AtomicBool>| flag.load(Ordering::Relaxed);
+        is_set(&self.cancelled) || self.expired.as_ref().is_some_and(is_set)
     }
 
     /// `Err(Cancelled)` once the run was interrupted. Call it at least every few milliseconds of work.

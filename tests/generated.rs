@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use meshmill::criteria::{LEVEL_KEYS, OWN_KEYS};
 use meshmill::format::Format;
-use meshmill::plan::{CHECK_KEYS, CRITERIA_KEYS, ELEMENTS, METRIC_ENDINGS, OUTPUT_KEYS};
+use meshmill::plan::{CHECK_KEYS, CRITERIA_KEYS, ELEMENTS, LIMIT_KEYS, LIMITS_KEYS, METRIC_ENDINGS, OUTPUT_KEYS};
 use meshmill::report::json;
 use meshmill::schema::{
     criteria_schema, criteria_schema_text, nested_tables, recipe_schema, recipe_schema_text, steps_reference,
@@ -59,6 +59,10 @@ fn the_schema_of_criteria_is_up_to_date_and_shipped_criteria_agree_with_it() {
         let faults: Vec<String> = validator.iter_errors(&criteria).map(|error| error.to_string()).collect();
         assert_eq!(faults, [""; 0], "{}", file.display());
     }
+    let limits = recipe_schema(CATALOG, &endings()).pointer("/properties/limits/properties").cloned().unwrap();
+    assert!(LIMITS_KEYS.iter().all(|key| limits.get(key).is_some()) && limits.as_object().unwrap().len() == 2);
+    let own = limits.pointer("/steps/additionalProperties/properties").and_then(Value::as_object).unwrap();
+    assert_eq!(own.keys().map(String::as_str).collect::<Vec<_>>(), LIMIT_KEYS);
     let keys: BTreeSet<&str> = schema["properties"].as_object().unwrap().keys().map(String::as_str).collect();
     assert!(OWN_KEYS.iter().filter(|key| **key != "file").all(|key| keys.contains(key)));
     let levels = schema.pointer("/definitions/NumberCriterion/anyOf/1/properties").and_then(Value::as_object).unwrap();

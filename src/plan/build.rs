@@ -8,6 +8,7 @@ use super::bind::{BoundDecl, bind};
 use super::case::{CaseContext, CaseSpec, Context};
 use super::columns::{ColumnDecl, ColumnRequest, Columns, result};
 use super::gates::{GateDecl, Group, gates};
+use super::limits::Limits;
 use super::merge::PlanBuilder;
 use super::outputs::{OutputDecl, outputs};
 use super::task::{GateTask, StepTask, TaskId};
@@ -78,6 +79,7 @@ fn plan_case(
     context.places = steps.iter().enumerate().rev().map(|(place, step)| (step.decl.name.as_str(), place)).collect();
     let wiring = wire(&steps, context);
     let gates = gates(&steps, &wiring, context);
+    let limits = Limits::read(&steps, context);
     let outputs = outputs(&steps, &wiring, context);
     let result = result(&steps, &wiring, &outputs);
     let reader = Columns { steps: &steps, wiring: &wiring, gates: &gates, result };
@@ -86,6 +88,9 @@ fn plan_case(
     if context.problems.is_empty() && recipe.problems.is_empty() {
         let parts = Parts { gates, outputs, columns, result };
         let nodes = Nodes::add(&steps, &wiring, &parts, builder);
+        for ((step, output), id) in &nodes.ids {
+            builder.limit(*id, limits.of(&steps[*step], output));
+        }
         let case = nodes.case(spec, context, parts, builder);
         builder.case(case);
     }

@@ -6,6 +6,7 @@
 
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::time::Duration;
 
 use super::key::{ContentHash, task_key};
 use super::task::{GateTask, SourceTask, StepTask, Task, TaskId};
@@ -18,6 +19,7 @@ pub struct PlanBuilder {
     plan: Plan,
     by_identity: BTreeMap<[u8; 32], TaskId>,
     identities: Vec<ContentHash>,
+    timeouts: BTreeMap<TaskId, Option<Duration>>,
 }
 
 impl PlanBuilder {
@@ -49,13 +51,23 @@ impl PlanBuilder {
         if let Some(known) = self.by_identity.get(identity.as_bytes()) {
             return *known;
         }
-        let id = self.plan.graph.add_node(Node { label, task });
+        let id = self.plan.graph.add_node(Node { label, task, timeout: None });
         for (name, input) in inputs {
             self.plan.graph.add_edge(*input, id, *name);
         }
         self.by_identity.insert(*identity.as_bytes(), id);
         self.identities.push(identity);
         id
+    }
+
+    /// Says how long a task may take, `None` for as long as it likes. Of several cases the most patient one counts.
+    pub fn limit(&mut self, id: TaskId, timeout: Option<Duration>) {
+        let longest = match (self.timeouts.get(&id), timeout) {
+            (None, timeout) => timeout,
+            (Some(Some(known)), Some(timeout)) => Some(timeout.max(*known)),
+            (Some(None), _) | (Some(_), None) => None,
+        };
+        self.timeouts.insert(id, longest);
     }
 
     /// Adds a case; its tasks come from this builder.
@@ -68,6 +80,9 @@ impl PlanBuilder {
     pub fn finish(mut self) -> Plan {
         if self.plan.cases.len() > 1 {
             self.name_cases();
+        }
+        for (id, timeout) in self.timeouts {
+            self.plan.graph[id].timeout = timeout;
         }
         self.plan
     }

@@ -32,8 +32,20 @@ pub use tree::{Entry, Node, Table, Tree};
 pub use unused::names_used;
 
 /// The sections of a recipe.
-const SECTIONS: [&str; 11] =
-    ["name", "description", "inputs", "params", "steps", "gates", "criteria", "outputs", "sweep", "extends", "drop"];
+const SECTIONS: [&str; 12] = [
+    "name",
+    "description",
+    "inputs",
+    "params",
+    "steps",
+    "gates",
+    "criteria",
+    "limits",
+    "outputs",
+    "sweep",
+    "extends",
+    "drop",
+];
 
 /// What the command line replaces.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -111,6 +123,8 @@ pub struct Recipe {
     pub gates: Table,
     /// Criteria by name, with what their files say below what the recipe says.
     pub criteria: Table,
+    /// How long steps may take.
+    pub limits: Table,
     /// Outputs by step.
     pub outputs: Table,
     /// The `[sweep]` section as it is.
@@ -144,6 +158,7 @@ impl Recipe {
             steps: parts.steps(),
             gates: parts.table("gates"),
             criteria: parts.table("criteria"),
+            limits: parts.table("limits"),
             outputs: parts.table("outputs"),
             sweep: parts.table("sweep"),
             sources: Arc::default(),

@@ -14,7 +14,8 @@ use super::tree::{Node, Table, Tree};
 pub(super) fn unused(recipe: &Recipe) -> Vec<Diagnostic> {
     let mut used = BTreeSet::new();
     let steps = recipe.steps.iter().map(|step| &step.table);
-    let sections = [&recipe.params, &recipe.gates, &recipe.criteria, &recipe.outputs, &recipe.sweep];
+    let Recipe { params, gates, criteria, limits, outputs, sweep, .. } = recipe;
+    let sections = [params, gates, criteria, limits, outputs, sweep];
     if !steps.chain(sections).all(|table| table_uses(table, &mut used)) {
         return Vec::new();
     }

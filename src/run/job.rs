@@ -9,6 +9,7 @@ use super::figures::figures;
 use super::node::{Finished, Node};
 use super::observe::{Event, Observer};
 use super::shared::{Shared, VERSION, recipe_task};
+use super::timer::timed;
 use super::{gate, output};
 use crate::plan::{ContentHash, GateTask, Record, StepTask, Task, TaskId};
 use crate::step::{FailureKind, Inputs, OutPort, Port, StepFailure};
@@ -100,7 +101,8 @@ fn step_task(
     let _turn = first.as_ref().map(|mesh| mesh.turn());
     let inputs = inputs.with_measured(measured);
     shared.needs().check(shared.plan, id, &inputs).map_err(Finished::Failed)?;
-    let work = || catch_unwind(AssertUnwindSafe(|| step.run(&inputs, watch)));
+    let timeout = shared.plan.node(id).timeout;
+    let work = || catch_unwind(AssertUnwindSafe(|| timed(timeout, watch, &|watch| step.run(&inputs, watch))));
     let produced = shared.pool()?.install(work).unwrap_or_else(|payload| Err(panicked(payload.as_ref())));
     let produced = produced.map_err(Finished::Failed)?;
     let figures = figures(&produced.artifact);

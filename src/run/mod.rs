@@ -36,6 +36,7 @@ mod shared;
 pub mod source;
 mod state;
 pub mod study;
+mod timer;
 mod whole;
 
 use std::collections::BTreeSet;

@@ -19,6 +19,8 @@ pub enum FailureKind {
     Cancelled,
     /// The step panicked; a fault of ours, reported as the step's failure.
     Panicked,
+    /// The step took longer than its limit: exit code 4.
+    TimedOut,
 }
 
 /// An element of a mesh that a message is about.
