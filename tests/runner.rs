@@ -383,6 +383,7 @@ fn the_forecast_says_what_the_run_then_does() {
         let words = |forecast: &Forecast| match forecast {
             Forecast::Source => "source".to_owned(),
             Forecast::Cached(_) => "cached".to_owned(),
+            Forecast::Failed(..) => "failed".to_owned(),
             Forecast::New(_) => "new".to_owned(),
             Forecast::DependsOn(tasks) => format!("depends on {}", plan.node(tasks[0]).label),
             Forecast::Changed(_, changes) => changes.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "),

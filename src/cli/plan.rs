@@ -26,6 +26,9 @@ pub(super) struct Arguments {
     /// Suppose that this step is run again.
     #[arg(long, value_name = "STEP")]
     force: Vec<String>,
+    /// Suppose that steps are run again whose failure is remembered.
+    #[arg(long)]
+    retry_failed: bool,
     /// Compare the key of this step with that of its earlier result, field by field.
     #[arg(long, value_name = "STEP")]
     explain: Vec<String>,
@@ -41,6 +44,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Fault>
     planned.check_steps("--explain", &arguments.explain)?;
     let mut options = options(&planned, arguments.out.as_deref(), None, &Interrupt::default())?;
     options.force.clone_from(&arguments.force);
+    options.retry_failed = arguments.retry_failed;
     let earlier = fs::read_to_string(options.out.join("run.ron")).map(|text| record::keys(&text)).unwrap_or_default();
     let known = |label: &str| known(&store, &earlier, label);
     let explained = explain(&planned.plan, &store, &options, &known);
@@ -69,7 +73,7 @@ fn to_text(plan: &Plan, forecasts: &[Forecast]) -> String {
     for (id, forecast) in plan.order().zip(forecasts) {
         let node = plan.node(id);
         let words = words(plan, forecast);
-        runs += usize::from(!matches!(forecast, Forecast::Source | Forecast::Cached(_)));
+        runs += usize::from(!matches!(forecast, Forecast::Source | Forecast::Cached(_) | Forecast::Failed(..)));
         table::add(&mut rows, [node.label.clone(), kind(&node.task).to_owned(), words]);
     }
     let tasks = plan.order().filter(|id| !matches!(plan.node(*id).task, Task::Source(_))).count();
@@ -146,6 +150,7 @@ fn words(plan: &Plan, forecast: &Forecast) -> String {
         Forecast::Source => "read".to_owned(),
         Forecast::Unreadable(failure) => failure.message.clone(),
         Forecast::Cached(_) => "cached".to_owned(),
+        Forecast::Failed(_, failure) => format!("failed before: {}", failure.message),
         Forecast::Forced(_) => "runs again: forced".to_owned(),
         Forecast::DependsOn(tasks) => {
             let names: Vec<&str> = tasks.iter().map(|task| plan.node(*task).label.as_str()).collect();
@@ -167,6 +172,7 @@ fn to_json(plan: &Plan, forecasts: &[Forecast]) -> Value {
             Forecast::Source => ("source", None, Vec::new()),
             Forecast::Unreadable(_) => ("unreadable", None, Vec::new()),
             Forecast::Cached(key) => ("cached", Some(key), Vec::new()),
+            Forecast::Failed(key, _) => ("failed", Some(key), Vec::new()),
             Forecast::Forced(key) => ("forced", Some(key), Vec::new()),
             Forecast::DependsOn(_) => ("depends", None, Vec::new()),
             Forecast::New(key) => ("new", Some(key), Vec::new()),

@@ -35,7 +35,7 @@ pub(super) fn observer(quiet: bool, verbose: bool) -> Arc<dyn Observer> {
 fn end_line(label: &str, state: TaskState, entry: Option<&Entry>, verbose: bool) -> Option<String> {
     let figures = entry.and_then(|entry| match &entry.outcome {
         Outcome::Artifact { figures, .. } => Some(figures_text(figures)).filter(|text| !text.is_empty()),
-        Outcome::Gate(_) | Outcome::File { .. } => None,
+        Outcome::Gate(_) | Outcome::Failure(_) | Outcome::File { .. } => None,
     });
     let figures = figures.map(|text| format!(", {text}")).unwrap_or_default();
     match state {

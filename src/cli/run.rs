@@ -40,6 +40,9 @@ pub(super) struct Arguments {
     /// Run this step again although it is cached; a result that differs is a fault.
     #[arg(long, value_name = "STEP")]
     force: Vec<String>,
+    /// Run steps again whose failure is remembered.
+    #[arg(long)]
+    retry_failed: bool,
     /// Write `report.html` into the output folder too: graph, metrics, charts and meshes in one file.
     #[arg(long)]
     report: bool,
@@ -88,6 +91,7 @@ pub(super) fn once(arguments: &Arguments, global: &Global, interrupt: &Interrupt
     let _claim = run::claim(&options.out)?;
     options.only.clone_from(&arguments.only);
     options.force.clone_from(&arguments.force);
+    options.retry_failed = arguments.retry_failed;
     let seen = if unchanged.is_some() { planned.seen() } else { Vec::new() };
     let held = arguments.locked.as_ref().map(|file| Held::new(Path::new(file), &planned, &store, &options));
     let held = held.transpose()?;

@@ -37,6 +37,9 @@ pub(super) struct Arguments {
     /// Most tasks at once, and most threads. Default: one for each processor.
     #[arg(long, short, value_name = "N")]
     jobs: Option<usize>,
+    /// Run steps again whose failure is remembered.
+    #[arg(long)]
+    retry_failed: bool,
     /// List the cases and run nothing.
     #[arg(long)]
     list: bool,
@@ -149,6 +152,7 @@ fn options(arguments: &Arguments, recipe: &Recipe, interrupt: &Interrupt, what: 
     let usual = || Path::new("out").join(format!("{}-{what}", recipe.name));
     let out = folder(arguments.out.clone().unwrap_or_else(usual))?;
     Ok(RunOptions {
+        retry_failed: arguments.retry_failed,
         protected: protected(recipe),
         cancelled: Arc::clone(&interrupt.cancelled),
         ..RunOptions::new(&recipe.name, out, jobs_of(arguments.jobs)?)

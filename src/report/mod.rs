@@ -257,7 +257,9 @@ impl Timings {
             Task::Gate(_) => "gate",
             Task::Source(_) => return,
         };
-        if matches!(outcome.state, TaskState::Done | TaskState::Failed) {
+        // A failure that was remembered has an entry.
+        let is_known = outcome.state == TaskState::Failed && outcome.entry.is_some();
+        if matches!(outcome.state, TaskState::Done | TaskState::Failed) && !is_known {
             *self.ran.entry(kind.to_owned()).or_default() += 1;
         }
     }
@@ -377,7 +379,7 @@ fn step_report(names: &Names<'_>, outcome: &RunOutcome, (id, name): (TaskId, &st
     let unread = files.find_map(|input| outcome.task(input).failure.clone());
     let figures = task.entry.as_ref().and_then(|entry| match &entry.outcome {
         Outcome::Artifact { figures, .. } => Some(figures.clone()),
-        Outcome::Gate(_) | Outcome::File { .. } => None,
+        Outcome::Gate(_) | Outcome::Failure(_) | Outcome::File { .. } => None,
     });
     Some(StepReport {
         name: name.to_owned(),

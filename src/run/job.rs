@@ -10,7 +10,7 @@ use super::node::{Finished, Node};
 use super::observe::{Event, Observer};
 use super::shared::{Shared, VERSION, recipe_task};
 use super::timer::timed;
-use super::{gate, output};
+use super::{failed, gate, output};
 use crate::plan::{ContentHash, GateTask, Record, StepTask, Task, TaskId};
 use crate::step::{FailureKind, Inputs, OutPort, Port, StepFailure};
 use crate::store::{Entry, Outcome};
@@ -54,7 +54,7 @@ fn task(shared: &Shared<'_>, id: TaskId, watch: &Watch) -> Result<Finished, Fini
     let node = shared.plan.node(id);
     let (outcome, stats) = match &node.task {
         Task::Source(_) => return Err(Finished::Failed(StepFailure::failed("a file is not a task to run"))),
-        Task::Step(step) => step_task(shared, id, step, watch)?,
+        Task::Step(step) => step_task(shared, id, step, (watch, start))?,
         Task::Gate(gate) => gate_task(shared, id, gate, watch)?,
     };
     let entry = entry(shared, &node.label, record, outcome, stats, start);
@@ -84,7 +84,7 @@ fn step_task(
     shared: &Shared<'_>,
     id: TaskId,
     step: &StepTask,
-    watch: &Watch,
+    (watch, start): (&Watch, Instant),
 ) -> Result<(Outcome, serde_json::Value), Finished> {
     let mut artifacts = Vec::new();
     for (name, input) in shared.plan.inputs(id) {
@@ -104,7 +104,10 @@ fn step_task(
     let timeout = shared.plan.node(id).timeout;
     let work = || catch_unwind(AssertUnwindSafe(|| timed(timeout, watch, &|watch| step.run(&inputs, watch))));
     let produced = shared.pool()?.install(work).unwrap_or_else(|payload| Err(panicked(payload.as_ref())));
-    let produced = produced.map_err(Finished::Failed)?;
+    let produced = produced.map_err(|failure| {
+        failed::remember(shared, id, &failure, start);
+        Finished::Failed(failure)
+    })?;
     let figures = figures(&produced.artifact);
     let saved = shared.save(&produced.artifact);
     if let Some(before) = shared.learn(id, saved.content) {

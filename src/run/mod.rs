@@ -20,6 +20,7 @@
 pub mod board;
 mod certify;
 mod claim;
+mod failed;
 mod figures;
 mod gate;
 mod guard;
@@ -71,6 +72,8 @@ pub struct RunOptions {
     pub only: Vec<String>,
     /// Steps that run again although they are cached.
     pub force: Vec<String>,
+    /// Whether steps run again whose failure is remembered.
+    pub retry_failed: bool,
     /// Files besides the plan's that no output may replace: the recipe, its bases, a lock file.
     pub protected: Vec<PathBuf>,
     /// Becomes true when the run should stop.
@@ -81,7 +84,8 @@ impl RunOptions {
     /// A run of all steps, nothing forced, that nobody interrupts.
     pub fn new(name: &str, out: PathBuf, jobs: usize) -> Self {
         let (only, force, protected) = (Vec::new(), Vec::new(), Vec::new());
-        Self { name: name.to_owned(), out, jobs, only, force, protected, cancelled: Arc::default() }
+        let (retry_failed, cancelled) = (false, Arc::default());
+        Self { name: name.to_owned(), out, jobs, only, force, retry_failed, protected, cancelled }
     }
 }
 

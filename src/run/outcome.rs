@@ -35,7 +35,7 @@ impl TaskOutcome {
     pub fn gate_report(&self) -> Option<GateReport> {
         match &self.entry.as_ref()?.outcome {
             Outcome::Gate(report) => serde_json::from_value(report.clone()).ok(),
-            Outcome::Artifact { .. } | Outcome::File { .. } => None,
+            Outcome::Artifact { .. } | Outcome::Failure(_) | Outcome::File { .. } => None,
         }
     }
 }

@@ -1,10 +1,10 @@
 //! What a run would do, and why, without doing it. Uses the keys of the run, so that it cannot tell otherwise.
 
 use super::shared::{Shared, recipe_task};
-use super::{RunOptions, source, tasks_of};
+use super::{RunOptions, failed, source, tasks_of};
 use crate::plan::{Change, Key, Plan, Record, SourceTask, Task, TaskId, task_record};
 use crate::step::StepFailure;
-use crate::store::{CODEC_VERSION, Store};
+use crate::store::{CODEC_VERSION, Outcome, Store};
 
 /// What a run would do with a task.
 #[derive(Clone, Debug)]
@@ -15,6 +15,8 @@ pub enum Forecast {
     Unreadable(StepFailure),
     /// The result is there.
     Cached(Key),
+    /// It failed, and would not run again.
+    Failed(Key, StepFailure),
     /// Cached, but it was asked to run again.
     Forced(Key),
     /// Whether it has to run is known after these tasks.
@@ -127,7 +129,13 @@ fn task_forecast(
         unknown.dedup();
         return (Forecast::DependsOn(unknown), earlier());
     };
-    if let Some(entry) = shared.store.entry(&key) {
+    let known = shared.store.entry(&key);
+    let failure = known.as_ref().filter(|_| !forced).and_then(|entry| failed::recall(entry, shared.options));
+    if let (Some(entry), Some(failure)) = (&known, failure) {
+        return (Forecast::Failed(key, failure), Some(Record { fields: entry.record.clone() }));
+    }
+    // A failure that does not count is no result.
+    if let Some(entry) = known.filter(|entry| !matches!(entry.outcome, Outcome::Failure(_))) {
         if let Some(content) = entry.content() {
             shared.learn(id, content);
         }

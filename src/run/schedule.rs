@@ -14,7 +14,7 @@ use super::observe::Observer;
 use super::outcome::{FileOutcome, FileState, RunOutcome, TaskOutcome};
 use super::shared::Shared;
 use super::state::TaskState;
-use super::{RunError, RunOptions, guard, output, tasks_of};
+use super::{RunError, RunOptions, failed, guard, output, tasks_of};
 use crate::plan::{Plan, SourceTask, Task, TaskId, in_case};
 use crate::step::{FailureKind, StepFailure};
 use crate::store::leftover::remove_leftovers;
@@ -286,6 +286,12 @@ impl<'a> Schedule<'a> {
         if self.forced.contains(&id) {
             self.before.insert(id, entry);
             return false;
+        }
+        if let Some(failure) = failed::recall(&entry, self.shared.options) {
+            self.tasks[id.index()].failure = Some(failure);
+            self.tasks[id.index()].entry = Some(entry);
+            self.set(node, TaskState::Failed, None);
+            return true;
         }
         if !self.note(id, &entry) {
             return false;

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{self, RecvTimeoutError};
 use std::thread;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use crate::step::{FailureKind, StepFailure};
 use crate::watch::Watch;
@@ -34,11 +34,13 @@ pub(super) fn timed<T>(
         let message = format!("cannot watch its time: {error}");
         StepFailure::new(FailureKind::TimedOut, message).with_help("run fewer tasks at once with --jobs N")
     })?;
+    let start = Instant::now();
     let result = work(&watch.limited(Arc::clone(&expired)));
     drop(ended);
-    match (expired.load(Ordering::Relaxed), result) {
-        // What is wrong with the work itself says more than how long it took; an interruption is one of the run.
-        (true, Err(failure)) if failure.kind != FailureKind::Cancelled || watch.is_cancelled() => Err(failure),
+    // The thread of the clock may come late.
+    match (expired.load(Ordering::Relaxed) || start.elapsed() > timeout, result) {
+        // An interruption is one of the run.
+        (true, Err(failure)) if watch.is_cancelled() => Err(failure),
         (true, _) => Err(over(timeout)),
         (false, result) => result,
     }

@@ -43,6 +43,8 @@ pub enum Outcome {
     },
     /// A gate gave its verdicts.
     Gate(Value),
+    /// A step could not do its work, and said why.
+    Failure(Value),
     /// An output file was written.
     File {
         /// Hash of its bytes.
@@ -97,7 +99,7 @@ impl Entry {
     pub fn content(&self) -> Option<Hash> {
         match &self.outcome {
             Outcome::Artifact { content, .. } => Some(*content),
-            Outcome::Gate(_) | Outcome::File { .. } => None,
+            Outcome::Gate(_) | Outcome::Failure(_) | Outcome::File { .. } => None,
         }
     }
 }
