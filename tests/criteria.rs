@@ -288,3 +288,17 @@ fn shipped_criteria_judge_every_kind_of_mesh() {
     // A cube of triangles is no shell of quads; right triangles with two equal sides are good enough for solids.
     assert_eq!(codes, [Some(3), Some(3), Some(0)], "{names:?}");
 }
+
+#[test]
+fn the_example_of_the_documentation_is_right() {
+    let page = include_str!("../docs/criteria.md");
+    let mut blocks = page.split("```toml\n").skip(1).map(|rest| rest.split("```").next().unwrap());
+    let (file, recipe) = (blocks.next().unwrap(), blocks.next().unwrap());
+    let desk = Desk::new();
+    desk.write("lab.criteria.toml", file);
+    desk.meshmill(&["measure", "cube.obj", "--criteria", "lab.criteria.toml", "--set", "size=1"]).assert().success();
+    let (head, _) = RECIPE.split_once("[criteria.lab]").unwrap();
+    let fe = "[steps.fe]\nuse = \"refine\"\nfrom = \"clean\"\nmax-edge = 2\n";
+    desk.write("recipe.toml", &format!("{head}{fe}{recipe}"));
+    desk.run(&[]).success();
+}
