@@ -18,6 +18,8 @@ const AT_ONCE: [f64; 2] = [0.5, 0.93];
 const AIM: f64 = 0.88;
 /// How far beyond the tolerance faces count that intersect.
 const CROSSING: f64 = 2.0;
+/// One face in so many may meet others for a while.
+const A_FEW: usize = 200;
 /// Strips between curves get edges up to so many times their width.
 const OF_STRIP: f64 = 1.6;
 /// A vertex is pulled to a lost place where no face gets worse than this.
@@ -144,6 +146,12 @@ impl Verdict {
     /// How much is left to do.
     pub(super) fn faults(&self) -> usize {
         self.places + self.crossing
+    }
+
+    /// Whether a mesh of so many faces meets itself in more places than it is off elsewhere, in more than `before`, and
+    /// not just in a few: smaller sizes only make more of folds.
+    pub(super) fn is_tangled(&self, before: usize, faces: usize) -> bool {
+        self.crossing > self.places.max(before).max(faces / A_FEW)
     }
 
     fn note(&mut self, work: &Work<'_>, corners: [VertexId; 3], excess: f64) {

@@ -11,8 +11,9 @@
 //! slowly along the mesh; where it is above, further collapses use it up. What is left of poor faces is mended in a
 //! guarded mesh ([`super::guarded`]), which also certifies the result.
 //!
-//! Where no certificate is reached, all is done again with other sizes, and then in the guarded mesh from the
-//! beginning.
+//! Where no certificate is reached, all is done again with edges that turn less over what is rounded off, and where the
+//! mesh is small in the guarded mesh from the beginning. A large one is left without a certificate: its reference has
+//! sheets that lie nearer to each other than the tolerance.
 //!
 //! Passes decide on edits on all threads, and do them in one order: the result is the same for any number.
 //!
@@ -50,7 +51,8 @@ use work::{Care, Work};
 
 use crate::mesh::bvh::TriangleBvh;
 use crate::mesh::halfedge::{EnterError, HalfedgeMesh};
-use crate::mesh::{FaceId, FreedomError, LockRules, Surface, resolve_freedom};
+use crate::mesh::id::Face;
+use crate::mesh::{FaceId, FreedomError, IdVec, LockRules, Surface, resolve_freedom};
 use crate::technique::guarded::{Counts, SizeField};
 use crate::technique::refine::RefineError;
 use crate::watch::{Cancelled, Watch};
@@ -152,11 +154,17 @@ pub enum RemeshError {
     Cancelled(#[from] Cancelled),
 }
 
-/// How fast sizes grow at first; the second where edits have led into a fold that none of them mends, and all is done
-/// again.
-const STARTS: [f64; 2] = [0.4, 0.27];
-/// How often sizes are made to grow more slowly for the sake of the mean stretch.
+/// The most that edges turn, in radians, and how fast sizes grow at first. The second and third where edits have led
+/// into a fold that none of them mends, and all is done again: where the tolerance is no smaller than what is rounded
+/// off, it alone lets thin limbs fold up.
+const STARTS: [(f64, f64); 3] = [(f64::INFINITY, 0.4), (1.0, 0.4), (f64::INFINITY, 0.27)];
+/// Meshes of more faces are not done again in the guarded mesh, which takes a millisecond and more for each.
+const MOST_GUARDED: usize = 16_000;
+/// How often sizes are made to grow more slowly for the sake of the mean stretch, which ends where it loses this much.
 const SLOWER: usize = 4;
+const SETBACK: f64 = 0.02;
+/// Nor where that has made so many times the faces.
+const DENSER: usize = 2;
 /// The mean stretch gains about so much where they grow by one less over a unit of length.
 const STEEP: f64 = 0.2;
 /// By how much less they grow at once, and how much at least.
@@ -172,6 +180,8 @@ const LOST_LATER: f64 = 0.001;
 const LOWERINGS: usize = 12;
 /// And how often without one that leaves fewer faults.
 const PATIENCE: usize = 4;
+/// Nor where more than one face in so many meets another.
+const HOPELESS: usize = 20;
 /// From which lowering on lost points of the reference draw vertices.
 const PULL_AFTER: usize = 1;
 /// Rounds of edits before the first certificate, and after each lowering of sizes.
@@ -201,15 +211,24 @@ pub fn remesh(
 ) -> Result<(Surface, Report), RemeshError> {
     let freedom = resolve_freedom(input.surface, &input.locks)?;
     let mesh = HalfedgeMesh::new(input.surface, &freedom)?;
-    let reference = Reference::new(input.surface, tree, &mesh, rules);
     let mut report = Report::default();
-    for gradation in STARTS {
+    let mut tried: Option<(IdVec<Face, f64>, HalfedgeMesh)> = None;
+    for (turn, gradation) in STARTS {
+        let reference = Reference::new(input.surface, tree, &mesh, rules, turn);
+        let is_as_before = tried.as_ref().is_some_and(|(longest, _)| *longest == reference.longest);
+        if turn.is_finite() && is_as_before {
+            continue;
+        }
         let mut work = Work::new(mesh.clone(), &reference, rules, gradation);
         let ended = work.attempts(&mut report, |mesh| mend(&mesh.leave().surface, input, tree, rules, watch), watch)?;
         report.edits = report.edits + work.tally;
         if let Some(ended) = ended {
             return Ok(report.ended(ended));
         }
+        tried = Some((reference.longest.clone(), work.mesh));
+    }
+    if let Some((_, mesh)) = tried.filter(|(_, mesh)| mesh.face_count() > MOST_GUARDED) {
+        return Ok((mesh.leave().surface, report));
     }
     report.is_guarded_all_along = true;
     let ended = guarded_all_along(input, tree, rules, watch)?;
@@ -234,13 +253,16 @@ impl Work<'_> {
         watch: &Watch,
     ) -> Result<Option<Ended>, RemeshError> {
         let mut memos = Memos::default();
-        let mut best: Option<Ended> = None;
+        let (mut best, mut before): (Option<Ended>, f64) = (None, 0.0);
         self.set_sizes();
         self.cut_up(watch)?;
         self.turn(ROUNDS[0], report, watch)?;
+        let most_faces = DENSER * self.mesh.face_count();
         for slower in 0..=SLOWER {
-            let lacks = self.rules.mean_stretch + LOST_LATER - self.mean();
-            if slower == SLOWER || lacks <= 0.0 || !self.grow_slower(lacks) {
+            let mean = self.mean();
+            let lacks = self.rules.mean_stretch + LOST_LATER - mean;
+            let gains = mean > std::mem::replace(&mut before, mean) - SETBACK && self.mesh.face_count() < most_faces;
+            if slower == SLOWER || lacks <= 0.0 || !gains || !self.grow_slower(lacks) {
                 if !self.until_clean(&mut memos, report, watch)? {
                     break;
                 }
@@ -248,7 +270,7 @@ impl Work<'_> {
                 let lacks = self.rules.mean_stretch - ended.mean;
                 let is_better = best.as_ref().is_none_or(|best| ended.mean > best.mean);
                 best = if is_better && ended.bound.is_some() { Some(ended) } else { best };
-                if lacks <= SLIGHTLY || !self.grow_slower(lacks) {
+                if lacks <= SLIGHTLY || self.mesh.face_count() >= most_faces || !self.grow_slower(lacks) {
                     break;
                 }
             }
@@ -273,7 +295,8 @@ impl Work<'_> {
         let mut fewest = (usize::MAX, 0);
         for lowering in 1..=LOWERINGS {
             fewest = if verdict.faults() < fewest.0 { (verdict.faults(), lowering) } else { fewest };
-            if verdict.is_clean() || lowering >= fewest.1 + PATIENCE {
+            let is_beyond_hope = verdict.crossing > self.mesh.face_count() / HOPELESS;
+            if verdict.is_clean() || is_beyond_hope || lowering >= fewest.1 + PATIENCE {
                 break;
             }
             self.care = Care::Sizes;
@@ -285,7 +308,10 @@ impl Work<'_> {
             self.care = Care::Samples;
             self.turn(ROUNDS[1], report, watch)?;
             report.lowerings += 1;
-            verdict = self.certify(memos, watch)?;
+            let before = std::mem::replace(&mut verdict, self.certify(memos, watch)?).crossing;
+            if lowering > PULL_AFTER && verdict.is_tangled(before, self.mesh.face_count()) {
+                break;
+            }
         }
         Ok(verdict.is_clean())
     }

@@ -10,7 +10,7 @@ use crate::mesh::id::Face;
 use crate::mesh::{FaceId, Freedom, IdVec, Soup, Surface};
 use crate::metric::distance::Target;
 use crate::technique::guarded::Curves;
-use crate::technique::sizing::curvature::longest_edges;
+use crate::technique::sizing::curvature::{Chord, longest_edges};
 
 /// A point of the reference.
 #[derive(Clone, Copy, Debug)]
@@ -34,12 +34,19 @@ pub(super) struct Reference<'a> {
 }
 
 impl<'a> Reference<'a> {
-    /// Prepares the surface that `mesh` was made of.
-    pub(super) fn new(surface: &'a Surface, tree: &'a TriangleBvh, mesh: &HalfedgeMesh, rules: &Rules) -> Self {
+    /// Prepares the surface that `mesh` was made of, for edges that turn by no more than so many radians.
+    pub(super) fn new(
+        surface: &'a Surface,
+        tree: &'a TriangleBvh,
+        mesh: &HalfedgeMesh,
+        rules: &Rules,
+        turn: f64,
+    ) -> Self {
         let soup = surface.to_soup();
         let is_curve = |e| mesh.edge_freedom(e) != Freedom::Free || mesh.is_boundary_edge(e);
         let segments = mesh.edges().filter(|&e| is_curve(e)).map(|e| mesh.ends(e).map(|v| mesh.point(v)));
-        let mut longest = longest_edges(mesh, SAGITTA * rules.tolerance, rules.size.most());
+        let chord = Chord { sagitta: SAGITTA * rules.tolerance, most: rules.size.most(), turn };
+        let mut longest = longest_edges(mesh, chord);
         for f in surface.faces.ids() {
             longest[f] = longest[f].min(rules.size.at(f));
         }

@@ -29,17 +29,35 @@ struct Bending {
     area: f64,
 }
 
-/// The longest edge up to `most` that lies no further than `sagitta` off the arc below it, for each face of a mesh that
-/// has just been entered.
-pub fn longest_edges(mesh: &HalfedgeMesh, sagitta: f64, most: f64) -> IdVec<Face, f64> {
-    let least_area = SPREAD * most * most;
+/// What bounds an edge over a bent surface; lengths in mesh units.
+#[derive(Clone, Copy, Debug)]
+pub struct Chord {
+    /// The farthest that it may lie off the arc below it.
+    pub sagitta: f64,
+    /// The longest that it may be.
+    pub most: f64,
+    /// The most that the arc may turn, in radians; arcs that a chord of twice the sagitta spans may turn further.
+    pub turn: f64,
+}
+
+impl Chord {
+    fn longest(&self, curvature: f64) -> f64 {
+        let curvature = curvature.max(f64::MIN_POSITIVE);
+        let turning = (self.turn / curvature).max(2.0 * self.sagitta);
+        (8.0 * self.sagitta / curvature).sqrt().min(turning).min(self.most)
+    }
+}
+
+/// The longest edge within these bounds, for each face of a mesh that has just been entered.
+pub fn longest_edges(mesh: &HalfedgeMesh, chord: Chord) -> IdVec<Face, f64> {
+    let least_area = SPREAD * chord.most * chord.most;
     let mut bending: Vec<Bending> = mesh.faces().map(|f| own(mesh, f)).collect();
     for _ in 0..PASSES {
         bending = mesh.faces().map(|f| shared(mesh, f, &bending, least_area)).collect();
     }
     let longest = |bending: &Bending| {
         let curvature = if bending.area > 0.0 { norm(&bending.tensor) / bending.area } else { 0.0 };
-        (8.0 * sagitta / curvature.max(f64::MIN_POSITIVE)).sqrt().min(most)
+        chord.longest(curvature)
     };
     bending.iter().map(longest).collect()
 }
@@ -95,4 +113,35 @@ fn shared(mesh: &HalfedgeMesh, f: FaceId, all: &[Bending], least_area: f64) -> B
         sum.area += next.area * share;
     }
     sum
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Chord;
+
+    /// An arc of this radius, a chord of this length: how far apart in the middle, and how far the arc turns.
+    fn arc(radius: f64, chord: f64) -> [f64; 2] {
+        let half = (0.5 * chord / radius).min(1.0).asin();
+        [radius * (1.0 - half.cos()), 2.0 * half]
+    }
+
+    #[test]
+    fn chords_keep_to_the_sagitta_and_where_asked_to_the_turn() {
+        let sagitta = 0.1;
+        for radius in [0.2, 0.4, 0.8, 1.6, 100.0] {
+            for turn in [f64::INFINITY, 1.0] {
+                let longest = Chord { sagitta, most: 5.0, turn }.longest(1.0 / radius);
+                let [off, turned] = arc(radius, longest);
+                // A parabola stands for the arc: a quarter of a circle lies a sixth farther off.
+                assert!(off <= 1.2 * sagitta || longest >= 2.0 * radius, "radius {radius}, turn {turn}: {off}");
+                assert!(turned <= 1.05 * turn || longest <= 2.0 * sagitta, "radius {radius}, turn {turn}: {turned}");
+                assert!(longest <= 5.0);
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_flat_gets_the_longest() {
+        assert_eq!(Chord { sagitta: 0.1, most: 3.0, turn: 1.0 }.longest(0.0), 3.0);
+    }
 }
