@@ -121,8 +121,8 @@ mod tests {
 
     /// An arc of this radius, a chord of this length: how far apart in the middle, and how far the arc turns.
     fn arc(radius: f64, chord: f64) -> [f64; 2] {
-        let half = (0.5 * chord / radius).min(1.0).asin();
-        [radius * (1.0 - half.cos()), 2.0 * half]
+        let half = libm::asin((0.5 * chord / radius).min(1.0));
+        [radius * (1.0 - libm::cos(half)), 2.0 * half]
     }
 
     #[test]
