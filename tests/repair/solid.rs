@@ -1,8 +1,11 @@
 //! Faces that run through each other are cut, and what is inside of bodies goes.
 
+use glam::DMat3;
 use meshmill::mesh::Regions;
 use meshmill::metric::intersection::self_intersections;
 use meshmill::steps::repair::{Bodies, SelfIntersections, repair_and_remove};
+
+use proptest::prelude::*;
 
 use super::*;
 
@@ -15,6 +18,13 @@ fn solid(soup: &Soup) -> (Surface, RepairStats) {
     let (surface, stats) = run_with(soup, &removing(Bodies::Union));
     let pairs = self_intersections(&surface.to_soup(), &Watch::silent()).expect("nobody interrupts").pairs;
     assert_eq!((pairs.len(), stats.self_intersections), (0, 0));
+    let certificate = stats.certificate.as_ref().expect("asked for");
+    assert_eq!((certificate.crossing_pairs, certificate.contacts, certificate.farthest), (0, 0, stats.max_move));
+    let (characteristic, border) = euler(&surface);
+    assert_eq!((certificate.euler_characteristic, certificate.closed), (characteristic, border == 0));
+    if let Some(enclosed) = certificate.volume {
+        assert!((enclosed - volume(&surface)).abs() <= 1e-9 * enclosed.abs());
+    }
     (surface, stats)
 }
 
@@ -178,7 +188,53 @@ fn what_faces_carry_goes_along() {
 fn where_nothing_meets_nothing_changes() {
     for soup in [cube([0.1; 3]), sphere(16, 0, 16), sphere(16, 2, 16), merged(cube([0.0; 3]), &cube([3.0, 0.0, 0.0]))] {
         let (reported, stats) = run(&soup);
-        let (removed, other) = run_with(&soup, &removing(Bodies::Union));
+        let (removed, mut other) = run_with(&soup, &removing(Bodies::Union));
+        let certificate = other.certificate.take().expect("asked for");
         assert_eq!((reported, stats), (removed, other));
+        assert_eq!(certificate.crossing_pairs + certificate.contacts, 0);
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(48))]
+
+    /// Boxes turned alike, which have planes, edges and corners in common, or nearly so.
+    #[test]
+    fn boxes_that_hardly_differ_from_touching_are_valid(
+        axis in [-1.0_f64..1.0, -1.0..1.0, -1.0..1.0],
+        angle in 0.0_f64..6.0,
+        steps in [0_usize..5, 0..5, 0..5],
+        tiny in prop::sample::select(vec![0.0, 1e-12, -1e-12, 1e-9, -1e-9, 1e-7]),
+        bodies in prop::sample::select(vec![Bodies::Union, Bodies::Keep]),
+    ) {
+        prop_assume!(DVec3::from_array(axis).length() > 0.1);
+        let turn = DMat3::from_axis_angle(DVec3::from_array(axis).normalize(), angle);
+        let offset = steps.map(|step| [0.0, 0.25, 0.5, 1.0, 1.0 + tiny][step]);
+        prop_assume!(offset != [0.0; 3]);
+        let mut soup = merged(cube([0.0; 3]), &cube(offset));
+        soup.points.iter_mut().for_each(|p| *p = turn * *p);
+        let (surface, stats) = repair(&soup, &removing(bodies), &Watch::silent()).expect("repairs");
+        check_manifold(&surface);
+        let found = self_intersections(&surface.to_soup(), &Watch::silent()).expect("nobody interrupts");
+        prop_assert_eq!((found.crossing().count(), euler(&surface).1), (0, 0));
+        if bodies == Bodies::Union {
+            prop_assert_eq!(found.contacts(), 0);
+        }
+        let common: f64 = offset.iter().map(|x| (1.0 - x).max(0.0)).product();
+        let expected = 2.0 - common;
+        prop_assert!((volume(&surface) - expected).abs() < 1e-6, "{} is not {}", volume(&surface), expected);
+        prop_assert!(stats.certificate.is_some_and(|certificate| certificate.closed));
+    }
+}
+
+#[test]
+fn any_number_of_threads_gives_the_same() {
+    let soup = merged(merged(pierced(), &cube([0.2, 0.2, -0.2])), &sphere(16, 0, 16));
+    for bodies in [Bodies::Union, Bodies::Keep] {
+        let made = [1, 3].map(|threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
+            pool.install(|| repair_and_remove(&soup, &removing(bodies), &Watch::silent()).expect("repairs"))
+        });
+        assert_eq!(made[0], made[1]);
     }
 }

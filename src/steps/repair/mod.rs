@@ -51,7 +51,7 @@ mod weld;
 mod zip;
 
 pub use params::{Bodies, FillHoles, KeepComponents, NonManifold, RepairParams, SelfIntersections};
-pub use report::{ComponentStats, LoopFate, LoopStats, RemovalStats, RepairError, RepairStats};
+pub use report::{Certificate, ComponentStats, LoopFate, LoopStats, RemovalStats, RepairError, RepairStats};
 
 use glam::DVec3;
 
@@ -100,6 +100,8 @@ pub fn repair_and_remove(
     }
     let longest = params.crossing_length.map(|length| (length.resolve(diagonal), diagonal));
     count_intersections(&surface, soup, left, longest, &mut stats, watch)?;
+    stats.certificate =
+        (params.self_intersections == SelfIntersections::Remove).then(|| solid::certify(&surface, &stats));
     stats.warnings = stats.taken_away().into_iter().chain(near::beside_each_other(&surface)).collect();
     Ok((surface, pieces, stats))
 }

@@ -94,6 +94,9 @@ pub struct RepairStats {
     /// What removing faces that run through each other did; absent where that was not asked for, or there were none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub removal: Option<RemovalStats>,
+    /// What is certain of the result; absent where removing faces that run through each other was not asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub certificate: Option<Certificate>,
     /// How far the surface may have moved outside filled holes at most: a bound, in mesh units.
     pub max_move: f64,
     /// Borders that lie beside each other and are not joined; a run says it.
@@ -161,6 +164,28 @@ impl RepairStats {
         self.cavities = more.cavities;
         self.degenerate_faces_left = more.degenerate_faces_left;
     }
+}
+
+/// What is certain of a result, beside that it is manifold and oriented.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub struct Certificate {
+    /// Whether it has no border.
+    pub closed: bool,
+    /// Parts that share no vertex with others.
+    pub bodies: u64,
+    /// Vertices − edges + faces.
+    pub euler_characteristic: i64,
+    /// What it encloses; absent where it has a border.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub volume: Option<f64>,
+    /// Pairs of faces that run through each other or overlap, decided exactly; at least as many where counting stopped.
+    pub crossing_pairs: u64,
+    /// Pairs that only touch.
+    pub contacts: u64,
+    /// No point of it lies farther from the input than this, but in filled holes; nor a point of the input from it, but
+    /// inside of bodies and in what was taken away otherwise.
+    pub farthest: f64,
 }
 
 /// What removing faces that run through each other did.

@@ -8,11 +8,11 @@ use glam::DVec3;
 
 use super::intersect::{Intersections, self_intersections};
 use super::params::{Bodies, RepairParams};
-use super::report::{RemovalStats, RepairError, RepairStats};
+use super::report::{Certificate, RemovalStats, RepairError, RepairStats};
 use crate::mesh::contact::tell_contacts;
-use crate::mesh::geometry::triangle_area;
+use crate::mesh::geometry::{Aabb, triangle_area};
 use crate::mesh::predicate::Meeting;
-use crate::mesh::topology::components;
+use crate::mesh::topology::{EdgeTable, components};
 use crate::mesh::{FaceId, Facet, Soup, Surface, VertexId};
 use crate::technique::arrange::{Fault, Resolved, Shared, resolve};
 use crate::watch::Watch;
@@ -95,6 +95,26 @@ pub(super) fn remove_intersections(
     removal.left_at = faces_of(&wanted).into_iter().take(LISTED).map(|f| middle(f).to_array()).collect();
     stats.removal = (removal.pairs > 0).then_some(removal);
     Ok(Removed { surface, pieces, left })
+}
+
+/// What is certain of a surface whose pairs are counted already. O(F log F).
+pub(super) fn certify(surface: &Surface, stats: &RepairStats) -> Certificate {
+    let edges = EdgeTable::new(surface);
+    let middle = Aabb::of(surface.points.iter().copied()).centre();
+    let cone = |f: FaceId| {
+        let [a, b, c] = surface.corners(f).map(|p| p - middle);
+        a.dot(b.cross(c)) / 6.0
+    };
+    let closed = edges.is_closed();
+    Certificate {
+        closed,
+        bodies: components(surface).count as u64,
+        euler_characteristic: surface.points.len() as i64 - edges.len() as i64 + surface.faces.len() as i64,
+        volume: closed.then(|| surface.faces.ids().map(cone).sum()),
+        crossing_pairs: stats.self_intersections - stats.contacts,
+        contacts: stats.contacts,
+        farthest: stats.max_move,
+    }
 }
 
 /// The pairs that are to be resolved: bodies that stay apart may touch.

@@ -1,6 +1,6 @@
 //! Bodies against volumes computed another way, and soups against their area; touching, scaled, mirrored, far away.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use glam::{DMat3, DVec3, dvec3};
 use proptest::prelude::*;
@@ -151,7 +151,14 @@ proptest! {
         let (left, right) = (map(&x), map(&x[9..]));
         prop_assume!(left.determinant().abs() > 0.05 && right.determinant().abs() > 0.05);
         let (a, b) = (body(shapes[0], left, vector(&x[18..])), body(shapes[1], right, vector(&x[21..])));
-        check_union(&a, &b, common_volume(&a, &b));
+        let common = common_volume(&a, &b);
+        let result = check_union(&a, &b, common);
+        if common > 1e-3 {
+            // Seen from a point of both all of it is in sight: no handle, no cavity.
+            let corners: BTreeSet<u32> = result.kept.faces.iter().flatten().copied().collect();
+            let faces = result.kept.faces.len();
+            prop_assert_eq!(corners.len() as i64 - faces as i64 / 2, 2);
+        }
     }
 
     #[test]
