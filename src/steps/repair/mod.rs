@@ -388,7 +388,7 @@ pub struct Step;
 
 impl crate::step::Step for Step {
     const NAME: &'static str = "repair";
-    const REVISION: u32 = 4;
+    const REVISION: u32 = 5;
     const INPUTS: &'static [InputDef] = &[InputDef {
         name: "from",
         accepts: &[Port::Soup, Port::Surface],
