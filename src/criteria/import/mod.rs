@@ -1,7 +1,7 @@
 //! Files of criteria of other programs, as criteria of ours.
 //!
 //! # Algorithm
-//! A reader takes a file apart into [`Item`]s, each with its lines: a check that has a metric of ours, or something
+//! A reader takes a file apart into `Item`s, each with its lines: a check that has a metric of ours, or something
 //! that has none and the reason. The writer puts both into one text, so that no line of the file is lost without a
 //! word.
 //!
