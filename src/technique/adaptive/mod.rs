@@ -12,8 +12,8 @@
 //! guarded mesh ([`super::guarded`]), which also certifies the result.
 //!
 //! Where no certificate is reached, all is done again with edges that turn less over what is rounded off, and where the
-//! mesh is small in the guarded mesh from the beginning. A large one is left without a certificate: its reference has
-//! sheets that lie nearer to each other than the tolerance.
+//! mesh is small in the guarded mesh from the beginning. A large one is returned without a certificate; mostly its
+//! reference has sheets that lie nearer to each other than the tolerance.
 //!
 //! Passes decide on edits on all threads, and do them in one order: the result is the same for any number.
 //!
@@ -162,7 +162,7 @@ pub enum RemeshError {
 /// into a fold that none of them mends, and all is done again: where the tolerance is no smaller than what is rounded
 /// off, it alone lets thin limbs fold up.
 const STARTS: [(f64, f64); 3] = [(f64::INFINITY, 0.4), (1.0, 0.4), (f64::INFINITY, 0.27)];
-/// Meshes of more faces are not done again in the guarded mesh, which takes a millisecond and more for each.
+/// Meshes of more faces are not done again in the guarded mesh, which takes milliseconds for each.
 const MOST_GUARDED: usize = 16_000;
 /// How often sizes are made to grow more slowly for the sake of the mean stretch, which ends where it loses this much.
 const SLOWER: usize = 4;
