@@ -254,19 +254,31 @@ fn limits() -> Value {
             long as they take.",
         "anyOf": [{ "type": "number", "exclusiveMinimum": 0 }, { "type": "string" }]
     });
+    let memory = json!({
+        "description": "How much memory a step may take beyond what is there when it begins: bytes, or such as \"500 MB\", \
+            \"2 GB\", \"1.5 GiB\".",
+        "anyOf": [{ "type": "number", "exclusiveMinimum": 0 }, { "type": "string" }]
+    });
+    let retries = json!({
+        "description": "How often a step is tried again that was over a limit, or whose files the disk did not take.",
+        "anyOf": [{ "type": "integer", "minimum": 0, "maximum": 100 }, { "type": "string", "pattern": "^=" }]
+    });
+    let or_none = |limit: &Value| json!({ "anyOf": [limit, { "const": false }] });
     json!({
         "type": "object",
         "description": "Limits of every step; one that is over its limit fails, and the others go on.",
         "additionalProperties": false,
         "properties": {
             "timeout": timeout,
+            "memory": memory,
+            "retries": retries,
             "steps": {
                 "type": "object",
-                "description": "By step, its own limits; `timeout = false` for none.",
+                "description": "By step, its own limits; `timeout = false` and `memory = false` for none.",
                 "additionalProperties": {
                     "type": "object",
                     "additionalProperties": false,
-                    "properties": { "timeout": { "anyOf": [timeout, { "const": false }] } }
+                    "properties": { "timeout": or_none(&timeout), "memory": or_none(&memory), "retries": retries }
                 }
             }
         }

@@ -2,15 +2,17 @@
 
 use std::fs;
 
-use assert_cmd::assert::Assert;
 use meshmill::report::json;
 use predicates::prelude::*;
 use serde_json::{Value, json};
 
 #[path = "common/desk.rs"]
 mod desk;
+#[path = "common/runs.rs"]
+mod runs;
 
 use desk::Desk;
+use runs::CUBE;
 
 const RECIPE: &str = r#"
 name = "part"
@@ -41,21 +43,9 @@ edge-ratio = { ideal = 1, good = 1.2, warn = 1.3, fail = 2, worst = 5, weight = 
 max-length = { ideal = "=size", good = "=2*size", warn = "=3*size", fail = "=4*size", worst = "=9*size" }
 "#;
 
-const CUBE: &str = include_str!("common/cube.obj");
-
 impl Desk {
     fn new() -> Self {
         Self::with(&[("recipe.toml", RECIPE), ("cube.obj", CUBE), ("lab.criteria.toml", LAB)])
-    }
-
-    fn run(&self, arguments: &[&str]) -> Assert {
-        self.meshmill(&["run", "recipe.toml", "--pictures", "none"]).args(arguments).assert()
-    }
-
-    /// What `--json` says of a run that ends with this code.
-    fn report(&self, code: i32, arguments: &[&str]) -> Value {
-        let assert = self.run(&[&["--json"], arguments].concat()).code(code);
-        serde_json::from_slice(&assert.get_output().stdout).unwrap()
     }
 }
 

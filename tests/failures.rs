@@ -5,8 +5,11 @@ use serde_json::{Value, json};
 
 #[path = "common/desk.rs"]
 mod desk;
+#[path = "common/runs.rs"]
+mod runs;
 
 use desk::Desk;
+use runs::CUBE;
 
 const RECIPE: &str = r#"
 name = "part"
@@ -23,20 +26,10 @@ clean = "clean.obj"
 "#;
 
 const WRONG: &str = "v 0 0 0\nv 1 0 zero\n";
-const CUBE: &str = include_str!("common/cube.obj");
 
 impl Desk {
     fn new() -> Self {
         Self::with(&[("recipe.toml", RECIPE), ("part.obj", WRONG)])
-    }
-
-    fn run(&self, arguments: &[&str]) -> assert_cmd::assert::Assert {
-        self.meshmill(&["run", "recipe.toml", "--pictures", "none"]).args(arguments).assert()
-    }
-
-    fn report(&self, code: i32, arguments: &[&str]) -> Value {
-        let assert = self.run(&[&["--json"], arguments].concat()).code(code);
-        serde_json::from_slice(&assert.get_output().stdout).unwrap()
     }
 }
 

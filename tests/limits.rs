@@ -1,12 +1,15 @@
-//! Limits of time: what is over them fails, says what to change, and takes nothing else along.
+//! Limits of time and memory: what is over them fails, says what to change, and takes nothing else along.
 
 use predicates::prelude::*;
-use serde_json::Value;
+use serde_json::{Value, json};
 
 #[path = "common/desk.rs"]
 mod desk;
+#[path = "common/runs.rs"]
+mod runs;
 
 use desk::Desk;
+use runs::CUBE;
 
 const RECIPE: &str = r#"
 name = "part"
@@ -36,8 +39,6 @@ fine = "fine.obj"
 clean = "clean.obj"
 "#;
 
-const CUBE: &str = include_str!("common/cube.obj");
-
 /// No step is as fast as that.
 const NO_TIME: &str = "time=1e-9";
 
@@ -45,20 +46,18 @@ impl Desk {
     fn new() -> Self {
         Self::with(&[("recipe.toml", RECIPE), ("cube.obj", CUBE)])
     }
+}
 
-    fn run(&self, arguments: &[&str]) -> assert_cmd::assert::Assert {
-        self.meshmill(&["run", "recipe.toml", "--pictures", "none"]).args(arguments).assert()
-    }
+/// What became of the step `fine`.
+fn failure(report: &Value) -> Value {
+    let steps = report["cases"][0]["steps"].as_array().unwrap();
+    steps.iter().find(|step| step["name"] == "fine").unwrap()["failure"].clone()
 }
 
 #[test]
 fn a_step_over_its_limit_fails_and_the_others_go_on() {
     let desk = Desk::new();
-    let assert = desk.run(&["--set", NO_TIME, "--json"]).code(4);
-    let report: Value = serde_json::from_slice(&assert.get_output().stdout).unwrap();
-    let steps = report["cases"][0]["steps"].as_array().unwrap().clone();
-    let fine = steps.iter().find(|step| step["name"] == "fine").unwrap();
-    assert_eq!(fine["failure"]["kind"], "timed-out");
+    assert_eq!(failure(&desk.report(4, &["--set", NO_TIME]))["kind"], "timed-out");
     desk.run(&["--set", NO_TIME]).code(4).stderr(
         predicate::str::contains("fine: took longer than its limit").and(predicate::str::contains("[limits.steps]")),
     );
@@ -94,10 +93,73 @@ fn wrong_limits_are_told_at_their_place() {
         ("\"2 h\"", "inf", "`timeout` is a number of seconds"),
         ("\"2 h\"", "1e300", "`timeout` is a number of seconds"),
         ("timeout = \"2 h\"", "timeuot = 1", "did you mean `timeout`?"),
+        ("timeout = \"2 h\"", "memory = \"much\"", "`memory` is a number of bytes"),
+        ("timeout = \"2 h\"", "memory = 0", "`memory` is a number of bytes"),
+        ("timeout = \"2 h\"", "memory = true", "`memory` is a number of bytes"),
+        ("timeout = \"2 h\"", "retries = 1.5", "`retries` is a whole number from 0 to 100"),
+        ("timeout = \"2 h\"", "retries = 101", "`retries` is a whole number from 0 to 100"),
+        ("timeout = \"2 h\"", "retries = false", "`retries` is a whole number from 0 to 100"),
         ("{ timeout = \"=time\" }", "{ time = \"=time\" }", "limits have no key `time`"),
         ("{ timeout = \"=time\" }", "\"=time\"", "the limits of a step are a table"),
     ] {
         desk.write("recipe.toml", &RECIPE.replace(from, to));
         desk.run(&[]).code(2).stderr(predicate::str::contains(said));
     }
+}
+
+/// The recipe with these limits of the step `fine`.
+fn with_limits(limits: &str) -> String {
+    RECIPE.replace("{ timeout = \"=time\" }", &format!("{{ {limits} }}")).replace("[params]\ntime = \"1 h\"", "")
+}
+
+#[test]
+fn a_step_that_takes_too_much_memory_fails_and_the_others_go_on() {
+    let desk = Desk::new();
+    desk.write("recipe.toml", &with_limits("memory = \"1 kB\""));
+    let report = desk.report(4, &[]);
+    let told = failure(&report);
+    assert_eq!(
+        (&told["kind"], &told["message"]),
+        (&json!("over-memory"), &json!("took more memory than its limit of 1.0 kB"))
+    );
+    assert!(told["help"].as_str().unwrap().contains("`memory` in [limits]"));
+    // It ran once, or beside another and then again alone; the others are done.
+    assert!(desk.path("out/part/clean.obj").exists() && !desk.path("out/part/fine.obj").exists());
+    // Nothing of it is remembered, and what is known needs no memory.
+    desk.write("recipe.toml", &with_limits("memory = \"1 GB\""));
+    desk.run(&[]).success();
+    desk.write("recipe.toml", &with_limits("memory = \"1 kB\""));
+    desk.run(&[]).success();
+}
+
+#[test]
+fn the_memory_of_tasks_is_recorded_with_their_time() {
+    let desk = Desk::new();
+    let first = desk.report(0, &["--jobs", "1"]);
+    let fine = &first["timings"]["memory"]["fine"];
+    // One at a time, so that it is exact; its result alone is not less than a kilobyte.
+    assert_eq!(fine["alone"], true);
+    assert!(fine["bytes"].as_u64().unwrap() > 1000, "{fine}");
+    // A cached result tells what it once took, as it tells its time.
+    assert_eq!(&desk.report(0, &[])["timings"]["memory"]["fine"], fine);
+    let schema = jsonschema::draft7::new(&meshmill::report::json::schema()).unwrap();
+    assert_eq!(schema.iter_errors(&first).map(|error| error.to_string()).collect::<Vec<_>>(), [""; 0]);
+    // What there is room for decides when tasks run, never what they give.
+    let result = desk.text("out/part/fine.obj");
+    desk.run(&["--jobs", "4", "--memory", "1", "--out", "narrow", "--force", "fine"]).success();
+    assert_eq!(desk.text("narrow/fine.obj"), result);
+    desk.run(&["--memory", "much"]).code(2).stderr(predicate::str::contains("expected a size"));
+}
+
+#[test]
+fn what_a_limit_ended_is_tried_again_and_a_steps_own_failure_is_not() {
+    let desk = Desk::new();
+    desk.write("recipe.toml", &with_limits("timeout = 1e-9, retries = 2"));
+    let told = failure(&desk.report(4, &[]));
+    assert_eq!(told["message"], "took longer than its limit of 0.000000001 s, 3 times");
+    desk.write("recipe.toml", &with_limits("memory = 1, retries = 1"));
+    assert_eq!(failure(&desk.report(4, &[]))["message"], "took more memory than its limit of 1 B, 2 times");
+    desk.write("recipe.toml", &with_limits("retries = 5").replace("max-size = \"20%\"", "max-size = 1e-30"));
+    let told = failure(&desk.report(4, &[]));
+    assert!(told["kind"] == "failed" && !told["message"].as_str().unwrap().contains("times"), "{told}");
 }

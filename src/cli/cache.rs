@@ -9,6 +9,7 @@ use super::Global;
 use super::context::{open_store, store_folder};
 use super::exit::{Exit, Fault, data, say};
 use crate::report::table::grouped;
+use crate::step::amount;
 use crate::store::{CleanReport, GcLimits, Store};
 
 /// Look after the cache.
@@ -61,7 +62,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Fault>
                 data(&format!("folder     {}", store.root().display()));
                 data(&format!("results    {}", grouped(stat.entries)));
                 data(&format!("artifacts  {}", grouped(stat.blobs)));
-                data(&format!("size       {}", bytes_text(stat.bytes)));
+                data(&format!("size       {}", amount::text(stat.bytes)));
                 data(&format!("leftovers  {}", grouped(stat.leftovers)));
             }
         }
@@ -85,45 +86,10 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Fault>
 
 fn tell(report: &CleanReport, verb: &str) {
     let CleanReport { entries, blobs, bytes, damaged: _ } = report;
-    data(&format!("{verb} {} results, {} artifacts, {}", grouped(*entries), grouped(*blobs), bytes_text(*bytes)));
-}
-
-const UNITS: [(&str, u64); 4] = [("TB", 1_000_000_000_000), ("GB", 1_000_000_000), ("MB", 1_000_000), ("kB", 1000)];
-
-fn bytes_text(bytes: u64) -> String {
-    for (unit, factor) in UNITS {
-        if bytes >= factor {
-            return format!("{:.1} {unit}", bytes as f64 / factor as f64);
-        }
-    }
-    format!("{bytes} B")
+    data(&format!("{verb} {} results, {} artifacts, {}", grouped(*entries), grouped(*blobs), amount::text(*bytes)));
 }
 
 /// A size such as `50GB`, `1.5 TB` or `1000`.
-fn size(text: &str) -> Result<u64, String> {
-    let split = text.find(|c: char| c.is_ascii_alphabetic()).unwrap_or(text.len());
-    let (number, unit) = (text[..split].trim(), text[split..].trim().to_ascii_lowercase());
-    let factor = match unit.as_str() {
-        "" | "b" => Some(1),
-        unit => UNITS.iter().find(|(name, _)| name.to_ascii_lowercase() == unit).map(|(_, factor)| *factor),
-    };
-    let number = number.parse::<f64>().ok().filter(|number| *number >= 0.0);
-    match (number, factor) {
-        (Some(number), Some(factor)) => Ok((number * factor as f64) as u64),
-        _ => Err(format!("expected a size such as 50GB or 800MB, got `{text}`")),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn sizes_are_read_with_their_units() {
-        assert_eq!(size("50GB"), Ok(50_000_000_000));
-        assert_eq!(size("1.5 MB"), Ok(1_500_000));
-        assert_eq!(size("12"), Ok(12));
-        assert!(size("-1").is_err() && size("1QB").is_err() && size("").is_err());
-        assert_eq!(bytes_text(1_500_000), "1.5 MB");
-    }
+pub(super) fn size(text: &str) -> Result<u64, String> {
+    amount::bytes(text).ok_or_else(|| format!("expected a size such as 50GB or 800MB, got `{text}`"))
 }

@@ -7,6 +7,7 @@ use clap::ValueEnum;
 use super::Global;
 use super::context::{RecipeArguments, lock_file, open_store};
 use super::exit::{Exit, Fault, say};
+use super::machine::MemoryArguments;
 use super::picture::Pictures;
 use super::run::{Ran, execute, options, tell};
 use super::signals::Interrupt;
@@ -36,6 +37,8 @@ pub(super) struct Arguments {
     /// Most tasks at once, and most threads. Default: one for each processor.
     #[arg(long, short, value_name = "N")]
     jobs: Option<usize>,
+    #[command(flatten)]
+    memory: MemoryArguments,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -56,6 +59,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Fault>
     let file = arguments.to.clone().unwrap_or_else(|| lock_file(&planned.recipe));
     planned.check_replaces(&file, &[])?;
     options.protected.push(file.clone());
+    let options = arguments.memory.applied(options, global);
     let _claim = run::claim(&options.out)?;
     let before = ingredients(&planned.recipe.name, &planned.plan, &run::records(&planned.plan, &store, &options));
     let Ran { report, cancelled, .. } = execute(&planned, &store, &options, global, (None, Pictures::default()))?;

@@ -17,6 +17,7 @@ mod graph;
 mod held;
 mod init;
 mod lock;
+mod machine;
 mod man;
 mod measure;
 mod picture;
@@ -40,6 +41,8 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand, ValueEnum};
 
 use exit::{Exit, Fault};
+
+use crate::run::Meter;
 
 /// Turns triangle meshes of any origin into finite-element surface meshes, by recipes that run as a cached graph.
 #[derive(Debug, Parser)]
@@ -66,6 +69,9 @@ struct Global {
     /// How log lines are written to stderr.
     #[arg(long, global = true, value_name = "FORMAT", default_value = "text")]
     log_format: LogFormat,
+    /// Measures memory.
+    #[arg(skip)]
+    meter: Option<Meter>,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -97,9 +103,13 @@ enum Command {
 }
 
 /// Parses the arguments, does what they say, and tells the exit code.
-pub fn main() -> ExitCode {
+/// `meter` tells how many bytes the program has allocated and not freed.
+pub fn main(meter: Meter) -> ExitCode {
     let arguments = match Arguments::try_parse() {
-        Ok(arguments) => arguments,
+        Ok(mut arguments) => {
+            arguments.global.meter = Some(meter);
+            arguments
+        }
         Err(error) => {
             // Help and version are no errors; a closed pipe is nobody's fault.
             let _ = error.print();

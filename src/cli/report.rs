@@ -152,6 +152,7 @@ impl Shelf<'_> {
             outcome: Outcome::Artifact { content: saved.content, bytes: saved.bytes, figures },
             stats: serde_json::Value::Null,
             seconds: 0.0,
+            memory: None,
         };
         self.0.publish(key, &entry)
     }

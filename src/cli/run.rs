@@ -9,6 +9,7 @@ use super::Global;
 use super::context::{Planned, RecipeArguments, open_store, protected};
 use super::exit::{Exit, Fault, coloured, data, document_text, say, say_failure};
 use super::held::Held;
+use super::machine::MemoryArguments;
 use super::picture::{self, Pictures};
 use super::progress;
 use super::record::write_record;
@@ -34,6 +35,8 @@ pub(super) struct Arguments {
     /// Most tasks at once, and most threads. Default: one for each processor.
     #[arg(long, short, value_name = "N")]
     jobs: Option<usize>,
+    #[command(flatten)]
+    memory: MemoryArguments,
     /// Run only this step and what it needs.
     #[arg(long, value_name = "STEP")]
     only: Vec<String>,
@@ -92,6 +95,7 @@ pub(super) fn once(arguments: &Arguments, global: &Global, interrupt: &Interrupt
     options.only.clone_from(&arguments.only);
     options.force.clone_from(&arguments.force);
     options.retry_failed = arguments.retry_failed;
+    let options = arguments.memory.applied(options, global);
     let seen = if unchanged.is_some() { planned.seen() } else { Vec::new() };
     let held = arguments.locked.as_ref().map(|file| Held::new(Path::new(file), &planned, &store, &options));
     let held = held.transpose()?;

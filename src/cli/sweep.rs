@@ -6,6 +6,7 @@ use std::sync::Arc;
 use super::Global;
 use super::context::{Planned, RecipeArguments, list_files, open_store, pair, plan_cases, protected};
 use super::exit::{Exit, Fault, data, say};
+use super::machine::MemoryArguments;
 use super::picture::{self, Pictures};
 use super::record::write_record;
 use super::run::{folder, jobs_of, left_out, path_bytes, traced, warnings};
@@ -37,6 +38,8 @@ pub(super) struct Arguments {
     /// Most tasks at once, and most threads. Default: one for each processor.
     #[arg(long, short, value_name = "N")]
     jobs: Option<usize>,
+    #[command(flatten)]
+    memory: MemoryArguments,
     /// Run steps again whose failure is remembered.
     #[arg(long)]
     retry_failed: bool,
@@ -73,7 +76,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Fault>
     let recipe = arguments.recipe.load(&arguments.axes)?;
     let interrupt = Interrupt::listen();
     if arguments.search.goal.is_some() {
-        let (store, options) = (open_store(global)?, options(arguments, &recipe, &interrupt, "goal")?);
+        let (store, options) = (open_store(global)?, options(arguments, &recipe, (&interrupt, global), "goal")?);
         let _claim = run::claim(&options.out)?;
         let observer = progress::observer(global.quiet, global.verbose > 0);
         let after = goal::After { form: arguments.form(), report: arguments.report, global, interrupt: &interrupt };
@@ -87,7 +90,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Fault>
         data(&names.join("\n"));
         return Ok(Exit::Done);
     }
-    let (store, options) = (open_store(global)?, options(arguments, &recipe, &interrupt, "sweep")?);
+    let (store, options) = (open_store(global)?, options(arguments, &recipe, (&interrupt, global), "sweep")?);
     let _claim = run::claim(&options.out)?;
     let trace = arguments.trace.as_deref();
     let planned = Planned { recipe, plan };
@@ -148,15 +151,21 @@ impl Arguments {
     }
 }
 
-fn options(arguments: &Arguments, recipe: &Recipe, interrupt: &Interrupt, what: &str) -> Result<RunOptions, Fault> {
+fn options(
+    arguments: &Arguments,
+    recipe: &Recipe,
+    (interrupt, global): (&Interrupt, &Global),
+    what: &str,
+) -> Result<RunOptions, Fault> {
     let usual = || Path::new("out").join(format!("{}-{what}", recipe.name));
     let out = folder(arguments.out.clone().unwrap_or_else(usual))?;
-    Ok(RunOptions {
+    let options = RunOptions {
         retry_failed: arguments.retry_failed,
         protected: protected(recipe),
         cancelled: Arc::clone(&interrupt.cancelled),
         ..RunOptions::new(&recipe.name, out, jobs_of(arguments.jobs)?)
-    })
+    };
+    Ok(arguments.memory.applied(options, global))
 }
 
 /// A case without a result counts for more than one whose gate does not hold.

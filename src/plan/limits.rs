@@ -1,4 +1,4 @@
-//! The `[limits]` section: how long steps may take.
+//! The `[limits]` section: how long steps may take, how much memory, and how often they are tried again.
 //!
 //! A limit decides whether a result comes, never which, and is no part of a key. Steps that measure have none: what
 //! they find out is kept for others of the same run, and what was cut off would be wrong for them.
@@ -10,35 +10,97 @@ use super::bind::BoundDecl;
 use super::case::CaseContext;
 use crate::recipe::suggest::did_you_mean;
 use crate::recipe::{Diagnostic, Entry, Node, Table, Tree, is_full};
-use crate::step::{OutPort, Port};
+use crate::step::{OutPort, Port, amount};
 
 /// The keys of the section.
-pub const LIMITS_KEYS: [&str; 2] = ["timeout", "steps"];
+pub const LIMITS_KEYS: [&str; 4] = ["timeout", "memory", "retries", "steps"];
 /// The keys of a step's own limits.
-pub const LIMIT_KEYS: [&str; 1] = ["timeout"];
+pub const LIMIT_KEYS: [&str; 3] = ["timeout", "memory", "retries"];
 
 /// Nobody waits longer, and clocks can count so far.
 const LONGEST: f64 = 365.0 * 86_400.0;
+/// What has failed so often fails again.
+const MOST_RETRIES: f64 = 100.0;
+
+/// What a task may take.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct TaskLimits {
+    /// How long, as long as it likes where there is none.
+    pub timeout: Option<Duration>,
+    /// How many bytes at once, beyond what was there when it began; any number where there is none.
+    pub memory: Option<u64>,
+    /// How often it is tried again after a limit or the disk ended it.
+    pub retries: u32,
+}
+
+impl TaskLimits {
+    /// The more patient of both in everything.
+    #[must_use]
+    pub fn or_more(self, other: Self) -> Self {
+        Self {
+            timeout: self.timeout.zip(other.timeout).map(|(a, b)| a.max(b)),
+            memory: self.memory.zip(other.memory).map(|(a, b)| a.max(b)),
+            retries: self.retries.max(other.retries),
+        }
+    }
+}
+
+/// A limit as it was written.
+#[derive(Clone, Copy)]
+enum Limit<T> {
+    AtMost(T),
+    No,
+}
+
+impl<T> Limit<T> {
+    fn at_most(self) -> Option<T> {
+        match self {
+            Self::AtMost(limit) => Some(limit),
+            Self::No => None,
+        }
+    }
+}
+
+/// What a step's own table says, or the section for all of them.
+#[derive(Clone, Copy, Default)]
+struct Own {
+    timeout: Option<Limit<Duration>>,
+    memory: Option<Limit<u64>>,
+    retries: Option<u32>,
+}
+
+impl Own {
+    /// Takes over a key; false where there is no such key.
+    fn read(&mut self, key: &str, value: &Tree, context: &mut CaseContext<'_>) -> bool {
+        match key {
+            "timeout" => self.timeout = timeout(value, context).ok(),
+            "memory" => self.memory = memory_limit(value, context).ok(),
+            "retries" => self.retries = retries(value, context).ok(),
+            _ => return false,
+        }
+        true
+    }
+}
 
 /// Limits of the steps of a case.
 pub(super) struct Limits {
-    usual: Option<Duration>,
-    own: BTreeMap<String, Option<Duration>>,
+    usual: Own,
+    own: BTreeMap<String, Own>,
 }
 
 impl Limits {
     pub(super) fn read(steps: &[BoundDecl<'_>], context: &mut CaseContext<'_>) -> Self {
-        let mut limits = Self { usual: None, own: BTreeMap::new() };
+        let mut limits = Self { usual: Own::default(), own: BTreeMap::new() };
         let recipe = context.recipe;
         for (key, entry) in recipe.limits.in_order() {
             match (key, &entry.value.value) {
-                ("timeout", _) => limits.usual = timeout(&entry.value, context).unwrap_or_default(),
                 ("steps", Node::Table(table)) => limits.steps(table, steps, context),
                 ("steps", other) => {
                     let message = format!("`steps` of the limits is a table, got {}", other.kind());
                     let help = "write [limits.steps] and below it NAME = { timeout = \"10 min\" }";
                     context.problems.push(Diagnostic::error(entry.value.span, message).help(help));
                 }
+                _ if limits.usual.read(key, &entry.value, context) => {}
                 _ => unknown(key, entry, &LIMITS_KEYS, context),
             }
         }
@@ -61,28 +123,34 @@ impl Limits {
                 let message = format!("`{name}` measures, and measuring has no limit");
                 context.problems.push(Diagnostic::error(entry.key, message).help("leave it out"));
             }
-            let Node::Table(own) = &entry.value.value else {
+            let Node::Table(table) = &entry.value.value else {
                 let message = format!("the limits of a step are a table, got {}", entry.value.value.kind());
                 let help = format!("write {name} = {{ timeout = \"10 min\" }}");
                 context.problems.push(Diagnostic::error(entry.value.span, message).help(help));
                 continue;
             };
-            for (key, value) in own.in_order() {
-                if key == "timeout" {
-                    self.own.extend(timeout(&value.value, context).ok().map(|timeout| (name.to_owned(), timeout)));
-                } else {
+            let mut own = Own::default();
+            for (key, value) in table.in_order() {
+                if !own.read(key, &value.value, context) {
                     unknown(key, value, &LIMIT_KEYS, context);
                 }
             }
+            self.own.insert(name.to_owned(), own);
         }
     }
 
-    /// How long an output of a step may take.
-    pub(super) fn of(&self, step: &BoundDecl<'_>, output: &str) -> Option<Duration> {
+    /// What an output of a step may take.
+    pub(super) fn of(&self, step: &BoundDecl<'_>, output: &str) -> TaskLimits {
+        let own = self.own.get(&step.decl.name).copied().unwrap_or_default();
+        let retries = own.retries.or(self.usual.retries).unwrap_or_default();
         if measures(step, output) {
-            return None;
+            return TaskLimits { retries, ..TaskLimits::default() };
         }
-        self.own.get(&step.decl.name).copied().unwrap_or(self.usual)
+        TaskLimits {
+            timeout: own.timeout.or(self.usual.timeout).and_then(Limit::at_most),
+            memory: own.memory.or(self.usual.memory).and_then(Limit::at_most),
+            retries,
+        }
     }
 }
 
@@ -99,22 +167,54 @@ fn unknown(key: &str, entry: &Entry, keys: &[&str], context: &mut CaseContext<'_
 /// What was written is wrong, which was told.
 struct Told;
 
-/// A time; `None` for `false`, which is no limit.
-fn timeout(value: &Tree, context: &mut CaseContext<'_>) -> Result<Option<Duration>, Told> {
+/// A time; `false` is no limit.
+fn timeout(value: &Tree, context: &mut CaseContext<'_>) -> Result<Limit<Duration>, Told> {
     let recipe = context.recipe;
     let value = context.scope.substitute(value, &recipe.sources, &mut context.problems).ok_or(Told)?;
     let seconds = match &value.value {
-        Node::Bool(false) => return Ok(None),
+        Node::Bool(false) => return Ok(Limit::No),
         Node::Number(_) => value.as_number(),
         Node::Text(text) => seconds(text),
         Node::Bool(_) | Node::Date(_) | Node::List(_) | Node::Table(_) | Node::File(_) => None,
     };
     if let Some(seconds) = seconds.filter(|seconds| *seconds > 0.0 && *seconds <= LONGEST) {
-        return Ok(Some(Duration::from_secs_f64(seconds)));
+        return Ok(Limit::AtMost(Duration::from_secs_f64(seconds)));
     }
     let message = "`timeout` is a number of seconds, or a time such as \"90 s\", \"10 min\" or \"2 h\"";
     context.problems.push(Diagnostic::error(value.span, message).help("at most a year; false for no limit"));
     Err(Told)
+}
+
+/// An amount of memory; `false` is no limit.
+fn memory_limit(value: &Tree, context: &mut CaseContext<'_>) -> Result<Limit<u64>, Told> {
+    let recipe = context.recipe;
+    let value = context.scope.substitute(value, &recipe.sources, &mut context.problems).ok_or(Told)?;
+    let bytes = match &value.value {
+        Node::Bool(false) => return Ok(Limit::No),
+        Node::Number(_) => value.as_number().filter(|bytes| *bytes > 0.0).map(|bytes| bytes as u64),
+        Node::Text(text) => amount::bytes(text).filter(|bytes| *bytes > 0),
+        Node::Bool(_) | Node::Date(_) | Node::List(_) | Node::Table(_) | Node::File(_) => None,
+    };
+    if let Some(bytes) = bytes {
+        return Ok(Limit::AtMost(bytes));
+    }
+    let message = "`memory` is a number of bytes, or an amount such as \"500 MB\", \"2 GB\" or \"1.5 GiB\"";
+    context.problems.push(Diagnostic::error(value.span, message).help("false for no limit"));
+    Err(Told)
+}
+
+/// How often to try again.
+fn retries(value: &Tree, context: &mut CaseContext<'_>) -> Result<u32, Told> {
+    let recipe = context.recipe;
+    let value = context.scope.substitute(value, &recipe.sources, &mut context.problems).ok_or(Told)?;
+    match value.as_number() {
+        Some(number) if (0.0..=MOST_RETRIES).contains(&number) && number.fract() == 0.0 => Ok(number as u32),
+        _ => {
+            let message = "`retries` is a whole number from 0 to 100";
+            context.problems.push(Diagnostic::error(value.span, message).help("0 to try once only"));
+            Err(Told)
+        }
+    }
 }
 
 /// A number with its unit of time.

@@ -6,9 +6,9 @@
 
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::time::Duration;
 
 use super::key::{ContentHash, task_key};
+use super::limits::TaskLimits;
 use super::task::{GateTask, SourceTask, StepTask, Task, TaskId};
 use super::{Case, CaseId, Node, Plan, in_case};
 use crate::recipe::normalize;
@@ -19,7 +19,7 @@ pub struct PlanBuilder {
     plan: Plan,
     by_identity: BTreeMap<[u8; 32], TaskId>,
     identities: Vec<ContentHash>,
-    timeouts: BTreeMap<TaskId, Option<Duration>>,
+    limits: BTreeMap<TaskId, TaskLimits>,
 }
 
 impl PlanBuilder {
@@ -51,7 +51,7 @@ impl PlanBuilder {
         if let Some(known) = self.by_identity.get(identity.as_bytes()) {
             return *known;
         }
-        let id = self.plan.graph.add_node(Node { label, task, timeout: None });
+        let id = self.plan.graph.add_node(Node { label, task, limits: TaskLimits::default() });
         for (name, input) in inputs {
             self.plan.graph.add_edge(*input, id, *name);
         }
@@ -60,14 +60,9 @@ impl PlanBuilder {
         id
     }
 
-    /// Says how long a task may take, `None` for as long as it likes. Of several cases the most patient one counts.
-    pub fn limit(&mut self, id: TaskId, timeout: Option<Duration>) {
-        let longest = match (self.timeouts.get(&id), timeout) {
-            (None, timeout) => timeout,
-            (Some(Some(known)), Some(timeout)) => Some(timeout.max(*known)),
-            (Some(None), _) | (Some(_), None) => None,
-        };
-        self.timeouts.insert(id, longest);
+    /// Says what a task may take. Of several cases the most patient one counts.
+    pub fn limit(&mut self, id: TaskId, limits: TaskLimits) {
+        self.limits.entry(id).and_modify(|known| *known = known.or_more(limits)).or_insert(limits);
     }
 
     /// Adds a case; its tasks come from this builder.
@@ -81,8 +76,8 @@ impl PlanBuilder {
         if self.plan.cases.len() > 1 {
             self.name_cases();
         }
-        for (id, timeout) in self.timeouts {
-            self.plan.graph[id].timeout = timeout;
+        for (id, limits) in self.limits {
+            self.plan.graph[id].limits = limits;
         }
         self.plan
     }

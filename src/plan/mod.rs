@@ -24,7 +24,6 @@ mod wire;
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
-use std::time::Duration;
 
 use petgraph::Direction;
 use petgraph::graph::DiGraph;
@@ -38,7 +37,7 @@ pub use case::{CaseSpec, Context};
 pub use columns::{COLUMN_KEYS, ColumnRequest};
 pub use gates::{CHECK_KEYS, CRITERIA, CRITERIA_KEYS};
 pub use key::{Change, ContentHash, Key, Record, task_key, task_record};
-pub use limits::{LIMIT_KEYS, LIMITS_KEYS};
+pub use limits::{LIMIT_KEYS, LIMITS_KEYS, TaskLimits};
 pub use merge::PlanBuilder;
 pub use outputs::{ELEMENTS, METRIC_ENDINGS, OUTPUT_KEYS};
 pub use task::{GateTask, SourceTask, StepTask, Task, TaskId};
@@ -54,8 +53,8 @@ pub struct Node {
     pub label: String,
     /// What it does.
     pub task: Task,
-    /// How long it may take; no part of its key.
-    pub timeout: Option<Duration>,
+    /// What it may take; no part of its key.
+    pub limits: TaskLimits,
 }
 
 /// One run of the recipe with its own parameters; a plain run has one case, a sweep has many.

@@ -25,7 +25,7 @@ use crate::metric::gate::GateRow;
 use crate::metric::gate::criteria::CriteriaReport;
 pub use crate::run::in_case;
 use crate::run::{
-    Case, Figures, FileState, Gate, Outcome, Plan, RunOutcome, Task, TaskId, TaskOutcome, TaskState, VERSION,
+    Case, Figures, FileState, Gate, Outcome, Peak, Plan, RunOutcome, Task, TaskId, TaskOutcome, TaskState, VERSION,
 };
 use crate::step::StepFailure;
 
@@ -168,6 +168,9 @@ pub struct Timings {
     /// counted once.
     #[serde(default)]
     pub ran: BTreeMap<String, usize>,
+    /// The most memory that each of `tasks` took, where that was measured when it ran.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub memory: BTreeMap<String, Peak>,
 }
 
 impl Report {
@@ -266,6 +269,9 @@ impl Timings {
 
     fn note(&mut self, name: String, task: &TaskOutcome) {
         let seconds = task.entry.as_ref().map_or(0.0, |entry| entry.seconds);
+        if let Some(peak) = task.entry.as_ref().and_then(|entry| entry.memory) {
+            self.memory.insert(name.clone(), peak);
+        }
         self.tasks.insert(name, (task.state, seconds));
     }
 }

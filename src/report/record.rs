@@ -88,6 +88,7 @@ mod tests {
                 tasks,
                 files: BTreeMap::new(),
                 ran: BTreeMap::from([("repair".to_owned(), 1)]),
+                memory: BTreeMap::from([("fe".to_owned(), crate::run::Peak { bytes: 12, alone: true })]),
             },
         };
         assert_eq!(from_ron(&to_ron(&report).unwrap()).unwrap(), report);

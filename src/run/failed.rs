@@ -2,8 +2,9 @@
 //!
 //! A step is pure: what it could not do to these inputs with these parameters, it cannot do the next time either. Its
 //! own failures are kept under the key of the task, as results are. What the machine or the clock decides is not: an
-//! interruption, a time that was up, a panic, which is a fault of ours, and whatever happens outside of the step. A
-//! failure counts for the version of the program that met it alone, since another may be able to do more.
+//! interruption, a time that was up, too little memory, a panic, which is a fault of ours, and whatever happens outside
+//! of the step. A failure counts for the version of the program that met it alone, since another may be able to do
+//! more.
 
 use std::time::Instant;
 
@@ -17,7 +18,7 @@ use crate::store::{Entry, Outcome};
 pub(super) fn remember(shared: &Shared<'_>, id: TaskId, failure: &StepFailure, start: Instant) {
     let is_own = match failure.kind {
         FailureKind::BadInput | FailureKind::Failed => true,
-        FailureKind::Cancelled | FailureKind::Panicked | FailureKind::TimedOut => false,
+        FailureKind::Cancelled | FailureKind::Panicked | FailureKind::TimedOut | FailureKind::OverMemory => false,
     };
     let interrupted = shared.options.cancelled.load(std::sync::atomic::Ordering::Relaxed);
     if let (true, false, Some((key, record)), Ok(json)) =
@@ -31,6 +32,7 @@ pub(super) fn remember(shared: &Shared<'_>, id: TaskId, failure: &StepFailure, s
             outcome: Outcome::Failure(json),
             stats: serde_json::Value::Null,
             seconds: start.elapsed().as_secs_f64(),
+            memory: None,
         };
         shared.publish(&key, &entry);
     }

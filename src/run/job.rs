@@ -5,15 +5,16 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::time::Instant;
 
+use super::bounded::{Ended, bounded};
 use super::figures::figures;
+use super::ledger::Account;
 use super::node::{Finished, Node};
 use super::observe::{Event, Observer};
 use super::shared::{Shared, VERSION, recipe_task};
-use super::timer::timed;
 use super::{failed, gate, output};
-use crate::plan::{ContentHash, GateTask, Record, StepTask, Task, TaskId};
+use crate::plan::{ContentHash, GateTask, StepTask, Task, TaskId, TaskLimits};
 use crate::step::{FailureKind, Inputs, OutPort, Port, StepFailure};
-use crate::store::{Entry, Outcome};
+use crate::store::{Entry, Outcome, Peak};
 use crate::watch::{Progress, Watch};
 
 /// Passes a step's progress on under its node's number.
@@ -36,8 +37,9 @@ impl Progress for NodeProgress {
 pub(super) fn run(shared: &Shared<'_>, index: usize, node: Node, observer: Arc<dyn Observer>) -> Finished {
     let progress = Arc::new(NodeProgress { node: index, observer });
     let watch = Watch::new(progress, Arc::clone(&shared.options.cancelled));
+    let account = shared.ledger.open(index);
     let work = || match node {
-        Node::Task(id) => task(shared, id, &watch),
+        Node::Task(id) => task(shared, id, &account, &watch),
         Node::File(case, position) => output::file(shared, case, position, &watch),
         Node::Faults(case, position) => output::faults(shared, case, position),
     };
@@ -46,46 +48,43 @@ pub(super) fn run(shared: &Shared<'_>, index: usize, node: Node, observer: Arc<d
         .unwrap_or_else(|finished| finished)
 }
 
-fn task(shared: &Shared<'_>, id: TaskId, watch: &Watch) -> Result<Finished, Finished> {
+fn task(shared: &Shared<'_>, id: TaskId, account: &Account, watch: &Watch) -> Result<Finished, Finished> {
     let start = Instant::now();
     let Some((key, record)) = shared.key(id) else {
         return Err(Finished::Failed(StepFailure::failed("started before its inputs were known")));
     };
     let node = shared.plan.node(id);
-    let (outcome, stats) = match &node.task {
+    let made = match &node.task {
         Task::Source(_) => return Err(Finished::Failed(StepFailure::failed("a file is not a task to run"))),
-        Task::Step(step) => step_task(shared, id, step, (watch, start))?,
-        Task::Gate(gate) => gate_task(shared, id, gate, watch)?,
+        Task::Step(step) => step_task(shared, id, step, (account, watch, start))?,
+        Task::Gate(gate) => gate_task(shared, id, gate, (account, watch))?,
     };
-    let entry = entry(shared, &node.label, record, outcome, stats, start);
+    let entry = Entry {
+        version: VERSION.to_owned(),
+        task: recipe_task(&shared.options.name, &node.label),
+        record: record.fields,
+        outcome: made.outcome,
+        stats: made.stats,
+        seconds: start.elapsed().as_secs_f64(),
+        memory: made.memory,
+    };
     shared.publish(&key, &entry);
     Ok(Finished::Task(Box::new(entry)))
 }
 
-fn entry(
-    shared: &Shared<'_>,
-    label: &str,
-    record: Record,
+/// What a task made.
+struct Made {
     outcome: Outcome,
     stats: serde_json::Value,
-    start: Instant,
-) -> Entry {
-    Entry {
-        version: VERSION.to_owned(),
-        task: recipe_task(&shared.options.name, label),
-        record: record.fields,
-        outcome,
-        stats,
-        seconds: start.elapsed().as_secs_f64(),
-    }
+    memory: Option<Peak>,
 }
 
 fn step_task(
     shared: &Shared<'_>,
     id: TaskId,
     step: &StepTask,
-    (watch, start): (&Watch, Instant),
-) -> Result<(Outcome, serde_json::Value), Finished> {
+    (account, watch, start): (&Account, &Watch, Instant),
+) -> Result<Made, Finished> {
     let mut artifacts = Vec::new();
     for (name, input) in shared.plan.inputs(id) {
         artifacts.push((name, shared.artifact(input)?));
@@ -101,12 +100,16 @@ fn step_task(
     let _turn = first.as_ref().map(|mesh| mesh.turn());
     let inputs = inputs.with_measured(measured);
     shared.needs().check(shared.plan, id, &inputs).map_err(Finished::Failed)?;
-    let timeout = shared.plan.node(id).timeout;
-    let work = || catch_unwind(AssertUnwindSafe(|| timed(timeout, watch, &|watch| step.run(&inputs, watch))));
-    let produced = shared.pool()?.install(work).unwrap_or_else(|payload| Err(panicked(payload.as_ref())));
-    let produced = produced.map_err(|failure| {
-        failed::remember(shared, id, &failure, start);
-        Finished::Failed(failure)
+    let limits = shared.plan.node(id).limits;
+    let work = || catch_unwind(AssertUnwindSafe(|| bounded(limits, account, watch, &|watch| step.run(&inputs, watch))));
+    let produced =
+        shared.pool()?.install(work).unwrap_or_else(|payload| Err(Ended::Failed(panicked(payload.as_ref()))));
+    let (produced, memory) = produced.map_err(|ended| match ended {
+        Ended::Crowded => Finished::Crowded,
+        Ended::Failed(failure) => {
+            failed::remember(shared, id, &failure, start);
+            Finished::Failed(failure)
+        }
     })?;
     let figures = figures(&produced.artifact);
     let saved = shared.save(&produced.artifact);
@@ -114,15 +117,16 @@ fn step_task(
         return Err(Finished::Failed(changed(before, saved.content)));
     }
     shared.keep(id, produced.artifact);
-    Ok((Outcome::Artifact { content: saved.content, bytes: saved.bytes, figures }, produced.stats))
+    let outcome = Outcome::Artifact { content: saved.content, bytes: saved.bytes, figures };
+    Ok(Made { outcome, stats: produced.stats, memory })
 }
 
 fn gate_task(
     shared: &Shared<'_>,
     id: TaskId,
     task: &GateTask,
-    watch: &Watch,
-) -> Result<(Outcome, serde_json::Value), Finished> {
+    (account, watch): (&Account, &Watch),
+) -> Result<Made, Finished> {
     let (mut target, mut reference) = (None, None);
     for (name, input) in shared.plan.inputs(id) {
         let mesh = gate::mesh(shared, input)?;
@@ -134,13 +138,16 @@ fn gate_task(
     }
     let target = target.ok_or_else(|| Finished::Failed(StepFailure::failed("the gate has no mesh to check")))?;
     let _turn = target.turn();
-    let work = || gate::evaluate(task, &target, reference.as_ref(), watch);
-    let work = || catch_unwind(AssertUnwindSafe(work));
-    let report = shared.pool()?.install(work).unwrap_or_else(|payload| Err(panicked(payload.as_ref())));
-    let report = report.map_err(Finished::Failed)?;
+    let work = |watch: &Watch| gate::evaluate(task, &target, reference.as_ref(), watch);
+    let work = || catch_unwind(AssertUnwindSafe(|| bounded(TaskLimits::default(), account, watch, &work)));
+    let report = shared.pool()?.install(work).unwrap_or_else(|payload| Err(Ended::Failed(panicked(payload.as_ref()))));
+    let (report, memory) = report.map_err(|ended| match ended {
+        Ended::Crowded => Finished::Crowded,
+        Ended::Failed(failure) => Finished::Failed(failure),
+    })?;
     let json = serde_json::to_value(&report).unwrap_or_default();
     shared.judge(id, report);
-    Ok((Outcome::Gate(json), serde_json::Value::Null))
+    Ok(Made { outcome: Outcome::Gate(json), stats: serde_json::Value::Null, memory })
 }
 
 fn changed(before: ContentHash, now: ContentHash) -> StepFailure {

@@ -18,6 +18,7 @@
 //! sweep finish one after the other and few artifacts are alive.
 
 pub mod board;
+mod bounded;
 mod certify;
 mod claim;
 mod failed;
@@ -25,6 +26,7 @@ mod figures;
 mod gate;
 mod guard;
 mod job;
+mod ledger;
 mod names;
 mod node;
 pub mod observe;
@@ -32,12 +34,12 @@ pub mod outcome;
 mod output;
 mod patches;
 pub mod preview;
+mod queue;
 mod schedule;
 mod shared;
 pub mod source;
 mod state;
 pub mod study;
-mod timer;
 mod whole;
 
 use std::collections::BTreeSet;
@@ -47,6 +49,7 @@ use std::sync::atomic::AtomicBool;
 
 pub use claim::{Claim, claim};
 pub use guard::{is_inside, replaced};
+pub use ledger::Meter;
 pub use node::FileNotes;
 pub use observe::{Event, Observer, Silent};
 pub use outcome::{FileOutcome, FileState, RunOutcome, TaskOutcome};
@@ -57,7 +60,7 @@ pub use state::TaskState;
 
 // An outcome speaks of these, so whoever reads outcomes finds them here.
 pub use crate::plan::{Case, Change, Column, Gate, Output, Plan, Record, StepTask, Task, TaskId, in_case};
-pub use crate::store::{Entry, Figures, Outcome, StoreError};
+pub use crate::store::{Entry, Figures, Outcome, Peak, StoreError};
 
 /// What the caller decides about a run.
 #[derive(Clone, Debug)]
@@ -68,6 +71,10 @@ pub struct RunOptions {
     pub out: PathBuf,
     /// Most tasks at once, and most threads within them.
     pub jobs: usize,
+    /// How much memory tasks may take together, as far as that was recorded of them; a task that takes more runs alone.
+    pub memory: Option<u64>,
+    /// Measures memory; without it there are no limits and no records of it.
+    pub meter: Option<Meter>,
     /// Only these steps and what they need; empty for all.
     pub only: Vec<String>,
     /// Steps that run again although they are cached.
@@ -85,7 +92,8 @@ impl RunOptions {
     pub fn new(name: &str, out: PathBuf, jobs: usize) -> Self {
         let (only, force, protected) = (Vec::new(), Vec::new(), Vec::new());
         let (retry_failed, cancelled) = (false, Arc::default());
-        Self { name: name.to_owned(), out, jobs, only, force, retry_failed, protected, cancelled }
+        let (memory, meter) = (None, None);
+        Self { name: name.to_owned(), out, jobs, memory, meter, only, force, retry_failed, protected, cancelled }
     }
 }
 

@@ -29,6 +29,8 @@ pub(super) enum Finished {
     Nothing,
     /// The artifact of this input is gone: make it again, then run this job again.
     Lost(TaskId),
+    /// It seemed to take more memory than its limit beside others: run it alone.
+    Crowded,
     /// It cannot be done.
     Failed(StepFailure),
     /// The disk failed; the whole run ends.

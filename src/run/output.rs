@@ -174,7 +174,7 @@ fn settle(
 
 fn file_entry(task: String, outcome: Outcome, notes: &FileNotes) -> Entry {
     let stats = serde_json::to_value(notes).unwrap_or_default();
-    Entry { version: VERSION.to_owned(), task, record: Vec::new(), outcome, stats, seconds: 0.0 }
+    Entry { version: VERSION.to_owned(), task, record: Vec::new(), outcome, stats, seconds: 0.0, memory: None }
 }
 
 fn known(shared: &Shared<'_>, task: TaskId) -> Result<ContentHash, Finished> {

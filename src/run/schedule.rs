@@ -12,7 +12,8 @@ use super::job;
 use super::node::{FileNotes, Finished, Node};
 use super::observe::Observer;
 use super::outcome::{FileOutcome, FileState, RunOutcome, TaskOutcome};
-use super::shared::Shared;
+use super::queue::Queue;
+use super::shared::{Shared, recipe_task};
 use super::state::TaskState;
 use super::{RunError, RunOptions, failed, guard, output, tasks_of};
 use crate::plan::{Plan, SourceTask, Task, TaskId, in_case};
@@ -85,12 +86,9 @@ struct Schedule<'a> {
     before: BTreeMap<TaskId, Entry>,
     forced: BTreeSet<TaskId>,
     files: BTreeMap<usize, Filed>,
-    /// By rank: the first task of the plan first, and a file right after the last task that it waits for, so that a
-    /// case is finished and forgotten before the next one fills the memory.
-    ready: BTreeSet<(usize, usize)>,
+    queue: Queue,
     /// Nodes to look at.
     look: VecDeque<usize>,
-    running: usize,
 }
 
 impl<'a> Schedule<'a> {
@@ -133,9 +131,8 @@ impl<'a> Schedule<'a> {
             before: BTreeMap::new(),
             forced: tasks_of(plan, &shared.options.force),
             files: BTreeMap::new(),
-            ready: BTreeSet::new(),
+            queue: Queue::new(shared.options.memory),
             look: VecDeque::new(),
-            running: 0,
         }
     }
 
@@ -187,24 +184,26 @@ impl<'a> Schedule<'a> {
     ) -> Result<(), RunError> {
         let mut broken = None;
         loop {
-            while self.running < self.shared.options.jobs.max(1) && broken.is_none() && !self.is_cancelled() {
-                let Some((_, node)) = self.ready.pop_first() else { break };
+            while self.queue.running() < self.shared.options.jobs.max(1) && broken.is_none() && !self.is_cancelled() {
+                let Some(node) = self.queue.start(&|| self.shared.ledger.settled()) else { break };
                 self.set(node, TaskState::Running, None);
-                self.running += 1;
                 start(node, self.nodes[node]);
             }
-            if self.running == 0 {
+            if self.queue.running() == 0 {
                 return broken.map_or(Ok(()), Err);
             }
             let Ok((node, result)) = finished.recv() else { return Ok(()) };
-            self.running -= 1;
-            if let Finished::Broken(error) = result {
-                broken.get_or_insert(error);
-                self.set(node, TaskState::Failed, None);
-            } else {
-                self.take_in(node, result);
-                self.look_around();
+            self.queue.end(node);
+            match result {
+                Finished::Broken(RunError::Output { .. }) if broken.is_none() && self.tries_again(node) => {}
+                Finished::Broken(error) => {
+                    broken.get_or_insert(error);
+                    self.set(node, TaskState::Failed, None);
+                    continue;
+                }
+                result => self.take_in(node, result),
             }
+            self.look_around();
         }
     }
 
@@ -255,15 +254,48 @@ impl<'a> Schedule<'a> {
                 self.set(node, TaskState::Want, None);
             }
             self.set(node, TaskState::Ready, None);
-            self.ready.insert((self.rank(node), node));
+            let weight = if self.queue.weighs() { self.weight(node) } else { 0 };
+            self.queue.push(self.rank(node), node, weight);
         }
     }
 
+    /// Its place among those that can run; what is tried again comes after the others.
     fn rank(&self, node: usize) -> usize {
-        match self.nodes[node] {
+        let rank = match self.nodes[node] {
             Node::Task(_) => node,
             Node::File(..) | Node::Faults(..) => self.board.inputs(node).iter().copied().max().unwrap_or(node),
+        };
+        rank + self.queue.retried(node) as usize * self.board.len()
+    }
+
+    /// The bytes that the node is expected to take: what the newest result of its name took, else its limit.
+    fn weight(&self, node: usize) -> u64 {
+        let Node::Task(id) = self.nodes[node] else { return 0 };
+        let task = self.shared.plan.node(id);
+        let newest = self.shared.store.newest(&recipe_task(&self.shared.options.name, &task.label));
+        let recorded = newest.and_then(|(_, entry)| entry.memory).map(|peak| peak.bytes);
+        recorded.or(task.limits.memory).unwrap_or_default()
+    }
+
+    /// Has a node run again that a limit or the disk ended, where its step may be tried again.
+    fn tries_again(&mut self, node: usize) -> bool {
+        let (plan, cases) = (self.shared.plan, self.shared.plan.cases());
+        let task = match self.nodes[node] {
+            Node::Task(id) => id,
+            Node::File(case, position) => cases[case].outputs[position].task,
+            Node::Faults(case, position) => cases[case].gates[position].target,
+        };
+        let again = self.queue.retry(node, plan.node(task).limits.retries);
+        if again {
+            self.wants(node);
         }
+        again
+    }
+
+    /// Takes a node that ran back to those that have to run.
+    fn wants(&mut self, node: usize) {
+        self.set(node, TaskState::Want, None);
+        self.look.push_back(node);
     }
 
     /// Whether the node needs no job: its result is known, or cannot be had.
@@ -359,10 +391,18 @@ impl<'a> Schedule<'a> {
                 }
                 self.look.push_back(node);
             }
+            Finished::Crowded => {
+                self.queue.isolate(node);
+                self.wants(node);
+            }
             Finished::Failed(failure) if failure.kind == FailureKind::Cancelled => {
                 self.set(node, TaskState::Cancelled, None);
             }
-            Finished::Failed(failure) => {
+            Finished::Failed(failure) if failure.kind.is_of_limits() && self.tries_again(node) => {}
+            Finished::Failed(mut failure) => {
+                if failure.kind.is_of_limits() && self.queue.retried(node) > 0 {
+                    failure.message = format!("{}, {} times", failure.message, self.queue.retried(node) + 1);
+                }
                 match self.nodes[node] {
                     Node::Task(id) => self.tasks[id.index()].failure = Some(failure),
                     Node::File(..) | Node::Faults(..) => {

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
+use super::ledger::Ledger;
 use super::names::Needs;
 use super::{RunError, RunOptions, source};
 use crate::metric::Measured;
@@ -24,6 +25,7 @@ pub(super) struct Shared<'a> {
     pub(super) store: &'a Store,
     pub(super) index: StatIndex,
     pub(super) options: &'a RunOptions,
+    pub(super) ledger: Arc<Ledger>,
     contents: Vec<OnceLock<ContentHash>>,
     slots: Vec<Mutex<Option<Slot>>>,
     reports: Vec<OnceLock<GateReport>>,
@@ -53,6 +55,7 @@ impl<'a> Shared<'a> {
             store,
             index: StatIndex::open(store),
             options,
+            ledger: Arc::new(Ledger::new(options.meter)),
             contents: (0..plan.len()).map(|_| OnceLock::new()).collect(),
             slots: (0..plan.len()).map(|_| Mutex::new(None)).collect(),
             reports: (0..plan.len()).map(|_| OnceLock::new()).collect(),

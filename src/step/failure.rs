@@ -21,6 +21,18 @@ pub enum FailureKind {
     Panicked,
     /// The step took longer than its limit: exit code 4.
     TimedOut,
+    /// The step took more memory than its limit: exit code 4.
+    OverMemory,
+}
+
+impl FailureKind {
+    /// Whether a limit of the recipe ended the step.
+    pub fn is_of_limits(self) -> bool {
+        match self {
+            Self::TimedOut | Self::OverMemory => true,
+            Self::BadInput | Self::Failed | Self::Cancelled | Self::Panicked => false,
+        }
+    }
 }
 
 /// An element of a mesh that a message is about.

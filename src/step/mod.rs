@@ -3,6 +3,7 @@
 //! A step is a plain library function plus one [`Step`] impl that binds it to recipes. The catalog (`steps::CATALOG`)
 //! is a list of [`StepDef`]s; planning, schema and command line see only those and never a concrete step.
 
+pub mod amount;
 pub mod artifact;
 pub mod failure;
 pub mod length;

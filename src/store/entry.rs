@@ -70,6 +70,18 @@ pub struct Entry {
     pub stats: Value,
     /// Seconds that it took.
     pub seconds: f64,
+    /// The most memory that it took, where that was measured.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub memory: Option<Peak>,
+}
+
+/// The most memory that a task held at once, beyond what was there when it began.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct Peak {
+    /// Bytes that were allocated and not freed.
+    pub bytes: u64,
+    /// Whether nothing else ran meanwhile; else it is an estimate, the task's share of what all of them took.
+    pub alone: bool,
 }
 
 /// Why bytes are not an entry.

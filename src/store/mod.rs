@@ -41,7 +41,7 @@ use tracing::warn;
 
 pub use clean::{CleanReport, GcLimits, StoreStat};
 pub use codec::{CODEC_VERSION, CodecError};
-pub use entry::{Entry, Figures, Outcome};
+pub use entry::{Entry, Figures, Outcome, Peak};
 pub use seal::SealError;
 pub use stat_index::StatIndex;
 

@@ -17,6 +17,7 @@ fn entry(saved: Saved) -> Entry {
         outcome: Outcome::Artifact { content: saved.content, bytes: saved.bytes, figures: Figures::default() },
         stats: serde_json::json!({ "rounds": 3, "worst": 0.1 }),
         seconds: 0.5,
+        memory: None,
     }
 }
 
