@@ -463,7 +463,7 @@ fn two_processes_on_one_cache_give_the_same_bytes() {
     let first = files(&bench.path("out-1"));
     assert_eq!(first.len(), 3);
     assert_eq!(first, files(&bench.path("out-2")));
-    assert!(bench.store().verify().unwrap().damaged.is_empty());
+    assert!(bench.store().verify(0).unwrap().damaged.is_empty());
 }
 
 #[test]
@@ -484,6 +484,6 @@ fn killed_at_any_moment_leaves_nothing_partial_and_the_next_run_gives_the_same_b
         }
         assert!(spawn(&bench, "out").wait().unwrap().success());
         assert_eq!(files(&bench.path("out")), expected, "killed after {delay} ms");
-        assert!(bench.store().verify().unwrap().damaged.is_empty());
+        assert!(bench.store().verify(0).unwrap().damaged.is_empty());
     }
 }

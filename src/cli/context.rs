@@ -6,10 +6,10 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use etcetera::BaseStrategy;
 
 use super::Global;
-use super::exit::{Exit, Fault};
+use super::config;
+use super::exit::Fault;
 use crate::format::Format;
 use crate::plan::{self, CaseSpec, ColumnRequest, Context, Plan};
 use crate::recipe::{LARGEST, Overrides, Recipe, suggest};
@@ -289,24 +289,9 @@ fn check_file(path: &Path) -> Result<(), String> {
     }
 }
 
-/// Opens the cache: `--cache`, else `MESHMILL_CACHE`, else `meshmill` in the user's cache folder.
+/// Opens the cache, as `config` finds it.
 pub(super) fn open_store(global: &Global) -> Result<Store, Fault> {
-    Ok(Store::open(&store_folder(global)?)?)
-}
-
-/// Where the cache is or would be.
-pub(super) fn store_folder(global: &Global) -> Result<PathBuf, Fault> {
-    let chosen = global.cache.clone().or_else(|| std::env::var_os("MESHMILL_CACHE").map(PathBuf::from));
-    if let Some(root) = chosen.filter(|root| !root.as_os_str().is_empty()) {
-        return Ok(root);
-    }
-    match etcetera::choose_base_strategy() {
-        Ok(strategy) => Ok(strategy.cache_dir().join("meshmill")),
-        Err(error) => {
-            let message = format!("there is no cache folder: {error}");
-            Err(Fault::new(Exit::Store, message).help("name one with --cache DIR or MESHMILL_CACHE"))
-        }
-    }
+    Ok(Store::with_levels(&config::levels(&global.cache)?)?)
 }
 
 pub(super) fn pair(text: &str) -> Result<(String, String), String> {

@@ -1,14 +1,23 @@
 //! A run held against a lock: it must be of what was locked, and give what was locked.
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::context::{Planned, lock_file};
-use super::exit::{Exit, Fault};
+use super::exit::{Exit, Fault, say};
 use crate::report::Report;
 use crate::report::lock::{Lock, ingredients};
 use crate::run::{self, RunOptions};
 use crate::store::Store;
+
+/// Keeps the results that a lock refers to in the cache. They can be made again, so that failing to do so is told and
+/// no error.
+pub(super) fn pin(lock: &Path, store: &Store, keys: &BTreeSet<String>) {
+    if let Err(error) = store.pin(lock, run::VERSION, keys) {
+        say(&format!("warning: `cache gc` may remove what {} refers to: {error}", lock.display()));
+    }
+}
 
 /// A lock that a run is held against.
 pub(super) struct Held {
@@ -33,9 +42,15 @@ impl Held {
     }
 
     /// Fails when the results are not those that were locked.
-    pub(super) fn check(self, report: &Report, out: &Path) -> Result<(), Fault> {
+    pub(super) fn check(self, report: &Report, out: &Path) -> Result<Self, Fault> {
         let now = self.now.clone().with_results(report, out);
-        self.differs(self.lock.changed_results(&now), "the files are those of this run")
+        self.differs(self.lock.changed_results(&now), "the files are those of this run")?;
+        Ok(self)
+    }
+
+    /// Keeps the results of these keys in the cache as long as the lock is there.
+    pub(super) fn pin(&self, store: &Store, keys: &BTreeSet<String>) {
+        pin(&self.file, store, keys);
     }
 
     fn differs(&self, lines: Vec<String>, state: &str) -> Result<(), Fault> {

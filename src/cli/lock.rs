@@ -7,6 +7,7 @@ use clap::ValueEnum;
 use super::Global;
 use super::context::{RecipeArguments, lock_file, open_store};
 use super::exit::{Exit, Fault, say};
+use super::held;
 use super::machine::MemoryArguments;
 use super::picture::Pictures;
 use super::run::{Ran, execute, options, tell};
@@ -62,7 +63,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Fault>
     let options = arguments.memory.applied(options, global);
     let _claim = run::claim(&options.out)?;
     let before = ingredients(&planned.recipe.name, &planned.plan, &run::records(&planned.plan, &store, &options));
-    let Ran { report, cancelled, .. } = execute(&planned, &store, &options, global, (None, Pictures::default()))?;
+    let Ran { report, cancelled, keys, .. } = execute(&planned, &store, &options, global, (None, Pictures::default()))?;
     if report.status != Status::Done {
         tell(&report, false, global.quiet)?;
         say("nothing was locked");
@@ -79,6 +80,7 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Fault>
     let written: Vec<PathBuf> = report.written().collect();
     planned.check_replaces(&file, &written)?;
     run::write_named(&file, text.as_bytes())?;
+    held::pin(&file, &store, &keys);
     if !global.quiet {
         say(&format!("{}: locked {} tasks and {} files", file.display(), lock.tasks.len(), lock.files.len()));
     }

@@ -7,6 +7,7 @@ mod best;
 mod cache;
 mod check;
 mod completions;
+mod config;
 mod context;
 mod convert;
 mod criteria;
@@ -57,9 +58,10 @@ struct Arguments {
 /// Options of every subcommand.
 #[derive(Clone, Debug, clap::Args)]
 struct Global {
-    /// Folder of the cache. Default: `MESHMILL_CACHE`, else the user's cache folder.
+    /// Folder of the cache; more than once for its levels, the nearest first. Default: `MESHMILL_CACHE`, else what the
+    /// files of settings say, else the user's cache folder.
     #[arg(long, global = true, value_name = "DIR")]
-    cache: Option<PathBuf>,
+    cache: Vec<PathBuf>,
     /// Print nothing but data and errors.
     #[arg(short, long, global = true, conflicts_with = "verbose")]
     quiet: bool,

@@ -13,7 +13,7 @@ use crate::report::sweep::SweepTable;
 use crate::report::{Report, record};
 use crate::run::{self, Entry, Figures, Outcome, VERSION};
 use crate::step::Artifact;
-use crate::store::Store;
+use crate::store::{Store, host};
 
 /// Write the page of a finished run: one HTML file with graph, metrics, charts and meshes, which works offline.
 #[derive(Debug, clap::Args)]
@@ -147,6 +147,7 @@ impl Shelf<'_> {
         let figures = Figures { port: artifact.port().to_string(), metrics: Some(made.clone()), ..Figures::default() };
         let entry = Entry {
             version: VERSION.to_owned(),
+            host: host(),
             task: "report/metrics".to_owned(),
             record: Vec::new(),
             outcome: Outcome::Artifact { content: saved.content, bytes: saved.bytes, figures },

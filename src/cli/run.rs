@@ -73,15 +73,17 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Fault>
 /// One run; `watch` does more than one.
 pub(super) fn once(arguments: &Arguments, global: &Global, interrupt: &Interrupt) -> Result<Exit, Fault> {
     let unchanged = arguments.unchanged(global);
-    if let Some(unchanged) = &unchanged
-        && let Some(exit) = unchanged.repeat(&open_store(global)?).and_then(Exit::of_code)
+    // Opened once, so that what there is to say of its levels is said once.
+    let early = unchanged.as_ref().map(|_| open_store(global)).transpose()?;
+    if let (Some(unchanged), Some(store)) = (&unchanged, &early)
+        && let Some(exit) = unchanged.repeat(store).and_then(Exit::of_code)
     {
         return Ok(exit);
     }
     let planned = arguments.recipe.plan()?;
     planned.check_steps("--only", &arguments.only)?;
     planned.check_steps("--force", &arguments.force)?;
-    let store = open_store(global)?;
+    let store = early.map_or_else(|| open_store(global), Ok)?;
     let mut options = options(&planned, arguments.out.as_deref(), arguments.jobs, interrupt)?;
     if let Some(lock) = arguments.locked.as_ref().filter(|lock| !lock.is_empty()) {
         options.protected.push(PathBuf::from(lock));
@@ -100,7 +102,7 @@ pub(super) fn once(arguments: &Arguments, global: &Global, interrupt: &Interrupt
     let held = arguments.locked.as_ref().map(|file| Held::new(Path::new(file), &planned, &store, &options));
     let held = held.transpose()?;
     let extras = (arguments.trace.as_deref(), arguments.pictures);
-    let Ran { report, cancelled, saved } = execute(&planned, &store, &options, global, extras)?;
+    let Ran { report, cancelled, saved, keys } = execute(&planned, &store, &options, global, extras)?;
     tell(&report, arguments.json, global.quiet)?;
     if cancelled {
         return Ok(interrupt.exit());
@@ -112,7 +114,7 @@ pub(super) fn once(arguments: &Arguments, global: &Global, interrupt: &Interrupt
         report::write(&report, None, &store, &[], &options.out.join("report.html"))?;
     }
     if let Some(held) = held {
-        held.check(&report, &options.out)?;
+        held.check(&report, &options.out)?.pin(&store, &keys);
     }
     if let (Some(unchanged), Status::Done, true) = (unchanged, report.status, saved) {
         let out = if global.quiet { String::new() } else { table::report(&report.unchanged()) };
@@ -141,6 +143,8 @@ pub(super) struct Ran {
     pub(super) cancelled: bool,
     /// Whether the cache took all of it.
     pub(super) saved: bool,
+    /// Keys of all its results, in hexadecimal.
+    pub(super) keys: BTreeSet<String>,
 }
 
 /// Runs the plan and keeps a record of it.
@@ -162,7 +166,8 @@ pub(super) fn execute(
         picture::write(&planned.plan, &outcome, store, pictures)?;
         write_record(&report, &options.out)?;
     }
-    Ok(Ran { report, cancelled: outcome.cancelled, saved: outcome.unsaved.is_none() })
+    let keys = outcome.tasks.iter().filter_map(|task| Some(task.key?.to_hex().to_string())).collect();
+    Ok(Ran { report, cancelled: outcome.cancelled, saved: outcome.unsaved.is_none(), keys })
 }
 
 /// Removes what the last run of this folder wrote and this one did not, with its picture, so that nobody takes it for a

@@ -68,15 +68,18 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Fault> {
     let unchanged = arguments.unchanged(global);
-    if let Some(unchanged) = &unchanged
-        && let Some(exit) = unchanged.repeat(&open_store(global)?).and_then(Exit::of_code)
+    // Opened once, so that what there is to say of its levels is said once.
+    let early = unchanged.as_ref().map(|_| open_store(global)).transpose()?;
+    if let (Some(unchanged), Some(store)) = (&unchanged, &early)
+        && let Some(exit) = unchanged.repeat(store).and_then(Exit::of_code)
     {
         return Ok(exit);
     }
     let recipe = arguments.recipe.load(&arguments.axes)?;
     let interrupt = Interrupt::listen();
     if arguments.search.goal.is_some() {
-        let (store, options) = (open_store(global)?, options(arguments, &recipe, (&interrupt, global), "goal")?);
+        let (store, options) =
+            (early.map_or_else(|| open_store(global), Ok)?, options(arguments, &recipe, (&interrupt, global), "goal")?);
         let _claim = run::claim(&options.out)?;
         let observer = progress::observer(global.quiet, global.verbose > 0);
         let after = goal::After { form: arguments.form(), report: arguments.report, global, interrupt: &interrupt };
@@ -90,7 +93,8 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Fault>
         data(&names.join("\n"));
         return Ok(Exit::Done);
     }
-    let (store, options) = (open_store(global)?, options(arguments, &recipe, (&interrupt, global), "sweep")?);
+    let (store, options) =
+        (early.map_or_else(|| open_store(global), Ok)?, options(arguments, &recipe, (&interrupt, global), "sweep")?);
     let _claim = run::claim(&options.out)?;
     let trace = arguments.trace.as_deref();
     let planned = Planned { recipe, plan };

@@ -12,7 +12,7 @@ use super::RunOptions;
 use super::shared::{Shared, VERSION, recipe_task};
 use crate::plan::TaskId;
 use crate::step::{FailureKind, StepFailure};
-use crate::store::{Entry, Outcome};
+use crate::store::{Entry, Outcome, host};
 
 /// Keeps the failure of a step.
 pub(super) fn remember(shared: &Shared<'_>, id: TaskId, failure: &StepFailure, start: Instant) {
@@ -27,6 +27,7 @@ pub(super) fn remember(shared: &Shared<'_>, id: TaskId, failure: &StepFailure, s
         let label = &shared.plan.node(id).label;
         let entry = Entry {
             version: VERSION.to_owned(),
+            host: host(),
             task: recipe_task(&shared.options.name, label),
             record: record.fields,
             outcome: Outcome::Failure(json),

@@ -14,7 +14,7 @@ use super::shared::{Shared, VERSION, recipe_task};
 use super::{failed, gate, output};
 use crate::plan::{ContentHash, GateTask, StepTask, Task, TaskId, TaskLimits};
 use crate::step::{FailureKind, Inputs, OutPort, Port, StepFailure};
-use crate::store::{Entry, Outcome, Peak};
+use crate::store::{Entry, Outcome, Peak, host};
 use crate::watch::{Progress, Watch};
 
 /// Passes a step's progress on under its node's number.
@@ -61,6 +61,7 @@ fn task(shared: &Shared<'_>, id: TaskId, account: &Account, watch: &Watch) -> Re
     };
     let entry = Entry {
         version: VERSION.to_owned(),
+        host: host(),
         task: recipe_task(&shared.options.name, &node.label),
         record: record.fields,
         outcome: made.outcome,

@@ -22,7 +22,7 @@ use crate::mesh::{FaceId, IdVec, Soup, VertexId};
 use crate::metric::gate::{FaultKind, GateReport};
 use crate::plan::{ContentHash, Gate, Output, OutputOptions, TaskId};
 use crate::step::{Artifact, StepFailure};
-use crate::store::{Entry, Outcome};
+use crate::store::{Entry, Outcome, host};
 use crate::watch::Watch;
 
 /// Where an output of a case belongs, and whether its gates hold. `None` while a gate is undecided.
@@ -174,7 +174,16 @@ fn settle(
 
 fn file_entry(task: String, outcome: Outcome, notes: &FileNotes) -> Entry {
     let stats = serde_json::to_value(notes).unwrap_or_default();
-    Entry { version: VERSION.to_owned(), task, record: Vec::new(), outcome, stats, seconds: 0.0, memory: None }
+    Entry {
+        version: VERSION.to_owned(),
+        host: host(),
+        task,
+        record: Vec::new(),
+        outcome,
+        stats,
+        seconds: 0.0,
+        memory: None,
+    }
 }
 
 fn known(shared: &Shared<'_>, task: TaskId) -> Result<ContentHash, Finished> {

@@ -14,7 +14,7 @@ pub(super) fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let write = || {
         fs::create_dir_all(folder)?;
-        write_by_rename(folder, path, bytes)
+        write_by_rename(folder, path, bytes, None)
     };
     match write() {
         // Another run may have removed the folder while it was empty.

@@ -7,6 +7,7 @@ use blake3::Hash;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::Value;
 
+use super::level::Flaw;
 use super::seal::{self, SealError};
 use crate::metric::Measurement;
 
@@ -60,6 +61,9 @@ pub enum Outcome {
 pub struct Entry {
     /// Version of the program that made it.
     pub version: String,
+    /// Machine that made it; empty in entries of earlier versions.
+    #[serde(default)]
+    pub host: String,
     /// Name of the task in the recipe that asked first, such as `bracket/fe`.
     pub task: String,
     /// The fields behind the key, name and value, so that a later run can say what changed.
@@ -93,6 +97,16 @@ pub enum EntryError {
     /// The document does not fit.
     #[error("{0}")]
     Json(#[from] serde_json::Error),
+}
+
+impl EntryError {
+    /// Whether the bytes are damaged, or sound and of another version: a seal that holds, over what does not fit.
+    pub(super) fn flaw(&self) -> Flaw {
+        match self {
+            Self::Seal(SealError::Foreign) | Self::Json(_) => Flaw::Foreign(self.to_string()),
+            Self::Seal(SealError::NotSealed | SealError::Checksum) => Flaw::Damaged(self.to_string()),
+        }
+    }
 }
 
 impl Entry {

@@ -16,17 +16,34 @@ const SUFFIX: &str = ".tmp";
 const STALE: Duration = Duration::from_hours(24);
 
 /// Writes `bytes` to a temporary file in `folder` and renames it to `path`, on the same file system. A link at `path`
-/// is replaced, not followed. Where anything fails, the temporary file is removed.
-pub fn write_by_rename(folder: &Path, path: &Path, bytes: &[u8]) -> io::Result<()> {
+/// is replaced, not followed. Where anything fails, the temporary file is removed. The file has the rights of `mode`,
+/// or those that the umask leaves.
+pub fn write_by_rename(folder: &Path, path: &Path, bytes: &[u8], mode: Option<u32>) -> io::Result<()> {
     let prefix = format!("{PREFIX}{}-{}-", host(), std::process::id());
     let mut builder = tempfile::Builder::new();
     builder.prefix(&prefix).suffix(SUFFIX);
     // Temporary files are private to their owner as a rule; here the umask decides, so that a lab can share a folder.
     #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(mode.unwrap_or(0o666)));
     let mut file = builder.tempfile_in(folder)?;
+    #[cfg(not(unix))]
+    let _ = mode;
+    #[cfg(unix)]
+    set_rights(file.as_file(), mode)?;
     file.write_all(bytes)?;
     file.persist(path).map_err(|error| error.error)?;
+    Ok(())
+}
+
+/// Gives a new file the rights that the umask took. Where the system refuses, those that it has must do.
+#[cfg(unix)]
+fn set_rights(file: &fs::File, mode: Option<u32>) -> io::Result<()> {
+    use std::os::unix::fs::PermissionsExt;
+    if let Some(mode) = mode
+        && file.metadata()?.permissions().mode() & 0o7777 != mode
+    {
+        let _ = file.set_permissions(PermissionsExt::from_mode(mode));
+    }
     Ok(())
 }
 

@@ -10,6 +10,8 @@ use super::columns::{ColumnKind, ColumnReader, HEAD};
 
 /// First bytes of a blob file.
 const MAGIC: &[u8; 8] = b"mmblob1\n";
+/// What the blob files of every version begin with.
+const FAMILY: &[u8] = b"mmblob";
 /// LZ4 cannot expand a byte to more than this many.
 const MAX_EXPANSION: usize = 255;
 
@@ -39,6 +41,12 @@ pub(super) fn unpack(file: &[u8]) -> Result<Vec<u8>, CodecError> {
         return Err(CodecError::Truncated);
     }
     walk(&shuffled, Direction::Unpack)
+}
+
+/// Whether a blob file is one of another version of the program.
+pub(super) fn is_foreign(file: &[u8]) -> bool {
+    file.strip_prefix(FAMILY).is_some_and(|rest| rest.first().is_some_and(u8::is_ascii_digit))
+        && !file.starts_with(MAGIC)
 }
 
 #[derive(Clone, Copy)]

@@ -10,6 +10,8 @@ use std::path::Path;
 
 /// First word of a sealed file.
 const MAGIC: &[u8] = b"meshmill-sealed-1 ";
+/// What the sealed files of every version begin with.
+const FAMILY: &[u8] = b"meshmill-sealed-";
 /// Length of the checksum: BLAKE3 in hexadecimal.
 const CHECKSUM: usize = 64;
 
@@ -19,6 +21,9 @@ pub enum SealError {
     /// Not a sealed file, or cut short before its body.
     #[error("not a file of this version")]
     NotSealed,
+    /// Sealed by another version of the program.
+    #[error("sealed by another version")]
+    Foreign,
     /// Changed, cut short, or written for another name.
     #[error("the checksum differs: damaged, or written for something else")]
     Checksum,
@@ -44,10 +49,17 @@ pub(super) fn seal(name: &[u8], body: &[u8]) -> Vec<u8> {
 
 /// What a file written for `name` holds.
 pub(super) fn open<'a>(name: &[u8], bytes: &'a [u8]) -> Result<&'a [u8], SealError> {
-    let rest = bytes.strip_prefix(MAGIC).ok_or(SealError::NotSealed)?;
+    let rest = bytes.strip_prefix(MAGIC).ok_or_else(|| strange(bytes))?;
     let (expected, rest) = rest.split_at_checked(CHECKSUM).ok_or(SealError::NotSealed)?;
     let body = rest.strip_prefix(b"\n").ok_or(SealError::NotSealed)?;
     if checksum(name, body).to_hex().as_bytes() == expected { Ok(body) } else { Err(SealError::Checksum) }
+}
+
+/// What bytes are that do not begin as a sealed file of this version.
+fn strange(bytes: &[u8]) -> SealError {
+    let rest = bytes.strip_prefix(FAMILY).unwrap_or_default();
+    let digits = rest.iter().take_while(|byte| byte.is_ascii_digit()).count();
+    if digits > 0 && rest.get(digits) == Some(&b' ') { SealError::Foreign } else { SealError::NotSealed }
 }
 
 /// Whether a plain file is there: no link, folder, pipe or device, which a store never makes.

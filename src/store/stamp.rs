@@ -100,7 +100,7 @@ impl Store {
         let path = self.stamp_file(identity);
         let next = path.with_extension("ron");
         let record = record.map(|(place, text)| {
-            self.write_whole(&next, text.as_bytes()).ok()?;
+            self.home.write_whole(&next, text.as_bytes()).ok()?;
             let known = |path: &Path| fs::metadata(path).ok().map(|meta| stat(&meta));
             let path = std::path::absolute(place).ok()?;
             Some(Record { now: known(&path)?, path, then: known(&next)?, next: next.clone() })
@@ -113,7 +113,7 @@ impl Store {
         let Some(read) = read else { return };
         files.extend(read);
         if let Ok(bytes) = serde_json::to_vec(&Stamp { files, said, record })
-            && let Err(error) = self.write_whole(&path, &seal::seal(stamp_name(identity).as_bytes(), &bytes))
+            && let Err(error) = self.home.write_whole(&path, &seal::seal(stamp_name(identity).as_bytes(), &bytes))
         {
             tracing::warn!(%error, "the stamp of the run was not saved");
         }
@@ -121,11 +121,11 @@ impl Store {
     }
 
     fn stamp_file(&self, identity: &Hash) -> PathBuf {
-        self.folder("stat").join(stamp_name(identity))
+        self.home.folder("stat").join(stamp_name(identity))
     }
 
     fn forget_old_stamps(&self) {
-        let Ok(entries) = fs::read_dir(self.folder("stat")) else { return };
+        let Ok(entries) = fs::read_dir(self.home.folder("stat")) else { return };
         let prefix = prefix();
         let stamps =
             entries.filter_map(Result::ok).filter(|entry| entry.file_name().to_string_lossy().starts_with(&prefix));

@@ -11,7 +11,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
+use std::sync::{Mutex, OnceLock};
 use std::time::{Duration, SystemTime};
 
 use blake3::Hash;
@@ -83,7 +83,7 @@ struct State {
 impl StatIndex {
     /// Reads the index of this machine; a missing or damaged one is empty.
     pub fn open(store: &Store) -> Self {
-        let file = store.folder("stat").join(host());
+        let file = store.home.folder("stat").join(host());
         let known = known_files(&file);
         Self { file, state: Mutex::new(State { known, changed: false }) }
     }
@@ -162,7 +162,7 @@ impl StatIndex {
             merged.retain(|_, known| known.used >= oldest_kept);
         }
         if let Ok(bytes) = serde_json::to_vec(&merged)
-            && let Err(error) = store.write_whole(&self.file, &seal::seal(host().as_bytes(), &bytes))
+            && let Err(error) = store.home.write_whole(&self.file, &seal::seal(host().as_bytes(), &bytes))
         {
             tracing::warn!(%error, "the index of file hashes was not saved");
         }
@@ -210,7 +210,12 @@ fn identity(_meta: &fs::Metadata) -> (u64, u64, u64) {
 }
 
 /// A name for this machine, fit as a file name. Two machines of one name share a file, which the stat keeps safe.
-pub(super) fn host() -> String {
+pub fn host() -> String {
+    static HOST: OnceLock<String> = OnceLock::new();
+    HOST.get_or_init(read_host).clone()
+}
+
+fn read_host() -> String {
     let name = fs::read_to_string("/proc/sys/kernel/hostname").or_else(|_| fs::read_to_string("/etc/hostname"));
     let name: String =
         name.unwrap_or_default().trim().chars().filter(|c| c.is_ascii_alphanumeric() || *c == '-').collect();

@@ -2,8 +2,14 @@
 
 use std::sync::Arc;
 
+use std::fs;
+use std::time::{Duration, SystemTime};
+
+use super::folder::TAG_FILE;
 use super::*;
 use crate::step::FileBytes;
+
+mod levels;
 
 fn artifact(bytes: &[u8]) -> Artifact {
     Artifact::File(Arc::new(FileBytes { name: "part.stl".into(), bytes: bytes.to_vec() }))
@@ -12,6 +18,7 @@ fn artifact(bytes: &[u8]) -> Artifact {
 fn entry(saved: Saved) -> Entry {
     Entry {
         version: "0".into(),
+        host: "node7".into(),
         task: "part/fe".into(),
         record: vec![("parameter size".into(), "2%".into())],
         outcome: Outcome::Artifact { content: saved.content, bytes: saved.bytes, figures: Figures::default() },
@@ -51,14 +58,14 @@ fn what_was_published_is_found_again() {
     assert_eq!(store.newest("part/fe").unwrap().0, key);
     let Some(Artifact::File(file)) = store.load(&saved.content) else { panic!("a file was saved") };
     assert_eq!(file.bytes, [0; 100]);
-    assert_eq!(store.stat().unwrap().leftovers, 0);
+    assert_eq!(store.stat(0).unwrap().leftovers, 0);
 }
 
 #[test]
 fn a_damaged_blob_is_a_miss_and_can_be_saved_again() {
     let (_folder, store) = store();
     let (_, saved) = fill(&store, 1)[0];
-    let path = store.place("cas", &saved.content);
+    let path = store.home.place(Kind::Blob, &saved.content);
     let mut bytes = fs::read(&path).unwrap();
     let last = bytes.len() - 1;
     bytes[last] ^= 1;
@@ -72,7 +79,7 @@ fn a_damaged_blob_is_a_miss_and_can_be_saved_again() {
 fn a_damaged_entry_is_a_miss() {
     let (_folder, store) = store();
     let (key, _) = fill(&store, 1)[0];
-    let path = store.place("ac", &key);
+    let path = store.home.place(Kind::Entry, &key);
     let bytes = fs::read(&path).unwrap();
     for len in [0, 10, bytes.len() - 1] {
         fs::write(&path, &bytes[..len]).unwrap();
@@ -84,12 +91,12 @@ fn a_damaged_entry_is_a_miss() {
 fn exchanged_entries_serve_nobody_and_verify_names_them() {
     let (_folder, store) = store();
     let keys: Vec<Hash> = fill(&store, 2).into_iter().map(|item| item.0).collect();
-    let paths: Vec<PathBuf> = keys.iter().map(|key| store.place("ac", key)).collect();
+    let paths: Vec<PathBuf> = keys.iter().map(|key| store.home.place(Kind::Entry, key)).collect();
     let bytes: Vec<Vec<u8>> = paths.iter().map(|path| fs::read(path).unwrap()).collect();
     fs::write(&paths[0], &bytes[1]).unwrap();
     fs::write(&paths[1], &bytes[0]).unwrap();
     assert!(keys.iter().all(|key| store.entry(key).is_none()));
-    assert_eq!(store.verify().unwrap().damaged.len(), 2);
+    assert_eq!(store.verify(0).unwrap().damaged.len(), 2);
 }
 
 #[test]
@@ -99,7 +106,7 @@ fn a_name_or_an_index_of_something_else_is_not_believed() {
     let mut other = entry(store.save(&artifact(b"other")).0);
     other.task = "other/fe".into();
     store.publish(&blake3::hash(b"other"), &other).unwrap();
-    let place = |task: &str| store.place("names", &name_hash(task));
+    let place = |task: &str| store.home.place(Kind::Name, &name_hash(task));
     fs::copy(place("other/fe"), place("part/fe")).unwrap();
     assert!(store.newest("part/fe").is_none());
     assert!(store.newest("other/fe").is_some());
@@ -109,7 +116,7 @@ fn a_name_or_an_index_of_something_else_is_not_believed() {
 fn a_folder_in_the_place_of_a_file_is_a_miss_and_is_replaced() {
     let (_folder, store) = store();
     let (key, saved) = fill(&store, 1)[0];
-    for path in [store.place("ac", &key), store.place("cas", &saved.content)] {
+    for path in [store.home.place(Kind::Entry, &key), store.home.place(Kind::Blob, &saved.content)] {
         fs::remove_file(&path).unwrap();
         fs::create_dir_all(path.join("inside")).unwrap();
     }
@@ -123,7 +130,7 @@ fn a_folder_in_the_place_of_a_file_is_a_miss_and_is_replaced() {
 fn a_pipe_in_the_place_of_a_file_is_a_miss_and_is_replaced() {
     let (_folder, store) = store();
     let (key, saved) = fill(&store, 1)[0];
-    for path in [store.place("ac", &key), store.place("cas", &saved.content)] {
+    for path in [store.home.place(Kind::Entry, &key), store.home.place(Kind::Blob, &saved.content)] {
         fs::remove_file(&path).unwrap();
         assert!(std::process::Command::new("mkfifo").arg(&path).status().unwrap().success());
     }
@@ -143,7 +150,7 @@ fn no_link_is_followed_for_writing() {
     assert!(!victim.exists(), "the target of a dangling tag was made");
     fs::write(&victim, "precious").unwrap();
     let (key, saved) = fill(&store, 1)[0];
-    for path in [store.place("ac", &key), store.place("cas", &saved.content)] {
+    for path in [store.home.place(Kind::Entry, &key), store.home.place(Kind::Blob, &saved.content)] {
         fs::remove_file(&path).unwrap();
         symlink(&victim, &path).unwrap();
     }
@@ -158,32 +165,32 @@ fn a_link_in_the_place_of_a_shard_is_neither_cleaned_nor_written_through() {
     let (_folder, store) = store();
     let outside = tempfile::tempdir().unwrap();
     let (key, _) = fill(&store, 1)[0];
-    let shard = store.place("ac", &key).parent().unwrap().to_path_buf();
+    let shard = store.home.place(Kind::Entry, &key).parent().unwrap().to_path_buf();
     let precious = outside.path().join(key.to_hex().as_str());
-    fs::rename(store.place("ac", &key), &precious).unwrap();
+    fs::rename(store.home.place(Kind::Entry, &key), &precious).unwrap();
     fs::remove_dir(&shard).unwrap();
     std::os::unix::fs::symlink(outside.path(), &shard).unwrap();
-    store.gc(GcLimits { max_bytes: Some(0), ..GcLimits::default() }).unwrap();
+    store.gc(0, GcLimits { max_bytes: Some(0), ..GcLimits::default() }).unwrap();
     assert!(precious.exists(), "gc deleted through a link");
     let before = fs::read(&precious).unwrap();
     fs::write(&precious, "precious").unwrap();
     fill(&store, 1);
     assert_eq!(fs::read(&precious).unwrap(), b"precious");
-    assert_eq!(fs::read(store.place("ac", &key)).unwrap().len(), before.len());
+    assert_eq!(fs::read(store.home.place(Kind::Entry, &key)).unwrap().len(), before.len());
 }
 
 #[test]
 fn clear_takes_earlier_layouts_along_and_gc_what_was_moved_aside() {
     let (folder, store) = store();
     fs::create_dir_all(folder.path().join("v1/ac/ab")).unwrap();
-    let aside = store.folder("tmp").join("folder-x");
+    let aside = store.home.folder("tmp").join("folder-x");
     fs::create_dir_all(aside.join("was/inside")).unwrap();
-    store.gc(GcLimits::default()).unwrap();
+    store.gc(0, GcLimits::default()).unwrap();
     assert!(aside.exists(), "it may be on the way");
     fs::File::open(&aside).unwrap().set_modified(SystemTime::now() - 2 * Duration::from_hours(1)).unwrap();
-    store.gc(GcLimits::default()).unwrap();
+    store.gc(0, GcLimits::default()).unwrap();
     assert!(!aside.exists() && folder.path().join("v1").exists());
-    store.clear().unwrap();
+    store.clear(0).unwrap();
     assert!(!folder.path().join("v1").exists());
 }
 
@@ -191,11 +198,11 @@ fn clear_takes_earlier_layouts_along_and_gc_what_was_moved_aside() {
 fn gc_removes_what_was_not_used_for_long() {
     let (_folder, store) = store();
     let items = fill(&store, 3);
-    age(&store.place("ac", &items[1].0), 1000);
+    age(&store.home.place(Kind::Entry, &items[1].0), 1000);
     let limits = GcLimits { max_age: Some(Duration::from_secs(500)), ..GcLimits::default() };
-    let dry = store.gc(GcLimits { dry_run: true, ..limits }).unwrap();
+    let dry = store.gc(0, GcLimits { dry_run: true, ..limits }).unwrap();
     assert!(store.entry(&items[1].0).is_some());
-    let report = store.gc(limits).unwrap();
+    let report = store.gc(0, limits).unwrap();
     assert_eq!((report.entries, report.blobs), (1, 1));
     assert_eq!(dry, report);
     assert!(store.entry(&items[1].0).is_none());
@@ -209,33 +216,33 @@ fn gc_by_size_keeps_a_blob_that_a_younger_entry_names() {
     let items = fill(&store, 2);
     let shared = blake3::hash(b"second key of the first content");
     store.publish(&shared, &entry(items[0].1)).unwrap();
-    age(&store.place("ac", &items[0].0), 3000);
-    let total = store.stat().unwrap().bytes;
-    let report = store.gc(GcLimits { max_bytes: Some(total - 1), ..GcLimits::default() }).unwrap();
+    age(&store.home.place(Kind::Entry, &items[0].0), 3000);
+    let total = store.stat(0).unwrap().bytes;
+    let report = store.gc(0, GcLimits { max_bytes: Some(total - 1), ..GcLimits::default() }).unwrap();
     assert_eq!((report.entries, report.blobs), (1, 0));
     assert!(store.load(&items[0].1.content).is_some());
-    store.gc(GcLimits { max_bytes: Some(0), ..GcLimits::default() }).unwrap();
-    assert_eq!(store.stat().unwrap(), StoreStat::default());
+    store.gc(0, GcLimits { max_bytes: Some(0), ..GcLimits::default() }).unwrap();
+    assert_eq!(store.stat(0).unwrap(), StoreStat::default());
 }
 
 #[test]
 fn gc_leaves_a_young_blob_without_entry_alone() {
     let (_folder, store) = store();
     let (saved, _) = store.save(&artifact(b"on the way"));
-    store.gc(GcLimits::default()).unwrap();
+    store.gc(0, GcLimits::default()).unwrap();
     assert!(store.load(&saved.content).is_some());
-    age(&store.place("cas", &saved.content), 2 * 60 * 60);
-    assert_eq!(store.gc(GcLimits::default()).unwrap().blobs, 1);
+    age(&store.home.place(Kind::Blob, &saved.content), 2 * 60 * 60);
+    assert_eq!(store.gc(0, GcLimits::default()).unwrap().blobs, 1);
 }
 
 #[test]
 fn verify_names_and_removes_what_is_damaged() {
     let (_folder, store) = store();
     let items = fill(&store, 2);
-    let path = store.place("cas", &items[0].1.content);
+    let path = store.home.place(Kind::Blob, &items[0].1.content);
     fs::write(&path, b"nonsense").unwrap();
-    assert_eq!(store.verify().unwrap().damaged, [path]);
-    assert_eq!(store.verify().unwrap(), CleanReport::default());
+    assert_eq!(store.verify(0).unwrap().damaged, [path]);
+    assert_eq!(store.verify(0).unwrap(), CleanReport::default());
 }
 
 #[cfg(unix)]
@@ -243,32 +250,32 @@ fn verify_names_and_removes_what_is_damaged() {
 fn verify_looks_at_every_file_and_at_what_is_none() {
     let (folder, store) = store();
     let items = fill(&store, 3);
-    let name = store.place("names", &name_hash("part/fe"));
+    let name = store.home.place(Kind::Name, &name_hash("part/fe"));
     let file = folder.path().join("part.stl");
     fs::write(&file, b"one").unwrap();
     let identity = stamp::identity(&[b"run"]);
     let said = stamp::Said::default();
     store.stamp(&identity, (vec![stamp::Seen::of(&file, None)], Vec::new()), said, Some((file, "next".to_owned())));
-    let stats: Vec<_> = fs::read_dir(store.folder("stat")).unwrap().map(|entry| entry.unwrap().path()).collect();
+    let stats: Vec<_> = fs::read_dir(store.home.folder("stat")).unwrap().map(|entry| entry.unwrap().path()).collect();
     let stamp = stats.iter().find(|path| path.extension().is_none()).unwrap();
-    let index = store.folder("stat").join("elsewhere");
+    let index = store.home.folder("stat").join("elsewhere");
     fs::write(&index, seal::seal(b"elsewhere", b"{}")).unwrap();
-    assert_eq!(store.verify().unwrap(), CleanReport::default(), "all of it is sound");
+    assert_eq!(store.verify(0).unwrap(), CleanReport::default(), "all of it is sound");
     fs::write(&name, "nonsense").unwrap();
     fs::write(stamp, "nonsense").unwrap();
     fs::write(&index, seal::seal(b"another", b"{}")).unwrap();
-    let (link, place) = (store.place("ac", &items[1].0), store.place("cas", &items[2].1.content));
+    let (link, place) = (store.home.place(Kind::Entry, &items[1].0), store.home.place(Kind::Blob, &items[2].1.content));
     fs::remove_file(&link).unwrap();
     std::os::unix::fs::symlink(&place, &link).unwrap();
     fs::remove_file(&place).unwrap();
     fs::create_dir_all(place.join("inside")).unwrap();
     let mut damaged = vec![name, stamp.clone(), index, link, place];
-    let mut found = store.verify().unwrap().damaged;
+    let mut found = store.verify(0).unwrap().damaged;
     damaged.sort();
     found.sort();
     assert_eq!(found, damaged);
     assert!(damaged.iter().all(|path| fs::symlink_metadata(path).is_err()));
-    assert_eq!(store.verify().unwrap(), CleanReport::default());
+    assert_eq!(store.verify(0).unwrap(), CleanReport::default());
 }
 
 #[test]
@@ -279,7 +286,7 @@ fn a_file_that_may_change_within_a_tick_is_not_remembered() {
         let index = StatIndex::open(&store);
         index.hash(&file).unwrap();
         index.flush(&store);
-        fs::read_dir(store.folder("stat")).unwrap().count() > 0
+        fs::read_dir(store.home.folder("stat")).unwrap().count() > 0
     };
     // Modified long ago by its own account, and changed just now. A busy machine may need some tries to be fast enough.
     let old = |time: SystemTime| fs::File::options().append(true).open(&file).unwrap().set_modified(time).unwrap();
@@ -291,7 +298,7 @@ fn a_file_that_may_change_within_a_tick_is_not_remembered() {
         let fast = start.elapsed() < Duration::from_millis(10);
         assert!(!fast || !remembered, "a file of this very tick was trusted");
         if remembered {
-            for entry in fs::read_dir(store.folder("stat")).unwrap() {
+            for entry in fs::read_dir(store.home.folder("stat")).unwrap() {
                 fs::remove_file(entry.unwrap().path()).unwrap();
             }
         }
@@ -310,10 +317,10 @@ fn a_file_that_may_change_within_a_tick_is_not_remembered() {
 fn clear_empties_a_cache_and_refuses_other_folders() {
     let (folder, store) = store();
     fill(&store, 2);
-    store.clear().unwrap();
-    assert_eq!(store.stat().unwrap(), StoreStat::default());
+    store.clear(0).unwrap();
+    assert_eq!(store.stat(0).unwrap(), StoreStat::default());
     fs::remove_file(folder.path().join(TAG_FILE)).unwrap();
-    assert!(matches!(store.clear(), Err(StoreError::NotACache(_))));
+    assert!(matches!(store.clear(0), Err(StoreError::NotACache(_))));
 }
 
 #[test]
@@ -332,7 +339,7 @@ fn an_unchanged_file_is_not_hashed_twice_but_a_fresh_one_is() {
     index.flush(&store);
     // A wrong hash in the index shows who answers.
     let hex = |text: &[u8]| blake3::hash(text).to_hex().to_string();
-    for entry in fs::read_dir(store.folder("stat")).unwrap().map(Result::unwrap) {
+    for entry in fs::read_dir(store.home.folder("stat")).unwrap().map(Result::unwrap) {
         let bytes = fs::read(entry.path()).unwrap();
         let name = entry.file_name().into_string().unwrap();
         let text = String::from_utf8(seal::open(name.as_bytes(), &bytes).unwrap().to_vec()).unwrap();
@@ -370,7 +377,7 @@ fn eight_writers_of_one_key_agree() {
         }
     });
     assert_eq!(
-        store.stat().unwrap(),
-        StoreStat { entries: 20, blobs: 20, bytes: store.stat().unwrap().bytes, leftovers: 0 }
+        store.stat(0).unwrap(),
+        StoreStat { entries: 20, blobs: 20, bytes: store.stat(0).unwrap().bytes, ..StoreStat::default() }
     );
 }
