@@ -2,7 +2,7 @@
 
 use std::fs;
 use std::path::Path;
-use std::process::Stdio;
+use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 use predicates::prelude::*;
@@ -277,4 +277,52 @@ fn a_watched_recipe_runs_again_when_its_input_changes() {
     child.wait().unwrap();
     assert!(first && second && third, "{}", desk.text("log"));
     assert!(after > 3 * before, "{before} {after}");
+}
+
+/// The fenced blocks of a page: language and text.
+fn blocks(page: &str) -> Vec<(&str, &str)> {
+    let fences: Vec<&str> = page.split("```").collect();
+    assert!(fences.len() % 2 == 1, "a fence is open");
+    fences.iter().skip(1).step_by(2).filter_map(|block| block.split_once('\n')).collect()
+}
+
+#[test]
+fn every_command_of_the_walk_through_does_what_it_says() {
+    let page = include_str!("../docs/lab.md");
+    let desk = Desk::with(&[]);
+    let part = fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/meshes/l_bracket.stl")).unwrap();
+    fs::create_dir(desk.path("bracket")).unwrap();
+    fs::write(desk.path("bracket/bracket.stl"), part).unwrap();
+    let program = Path::new(assert_cmd::cargo::cargo_bin!("meshmill")).parent().unwrap().to_owned();
+    let path = format!("{}:{}", program.display(), std::env::var("PATH").unwrap_or_default());
+    let (mut files, mut commands, mut exported) = (0, 0, Vec::new());
+    for (language, text) in blocks(page) {
+        if language == "toml" {
+            let name = text.lines().next().and_then(|line| line.strip_prefix("# ")).unwrap();
+            desk.write(name, text);
+            files += 1;
+            continue;
+        }
+        assert_eq!(language, "sh");
+        for line in text.lines() {
+            if line.starts_with("export ") {
+                exported.push(line);
+                continue;
+            }
+            let expected = line.split_once("# ends with ").map_or(0, |(_, code)| code.trim().parse().unwrap());
+            let script = [exported.clone(), vec![line]].concat().join("\n");
+            let mut command = Command::new("sh");
+            command.args(["-c", &script]).current_dir(desk.path("")).env("PATH", &path);
+            let output = command.env("MESHMILL_CACHE", desk.path("cache")).output().unwrap();
+            let said = String::from_utf8_lossy(&output.stderr);
+            assert_eq!(output.status.code(), Some(expected), "{line}\n{said}");
+            commands += 1;
+        }
+    }
+    assert!(files == 3 && commands > 12, "{files} files, {commands} commands");
+    // What the page promises of them.
+    assert!(desk.text("tests.xml").contains("<testsuite"));
+    let record = desk.text("second/run.ron");
+    assert!(record.contains("ran: {}"), "the second run computed something");
+    assert_eq!(desk.text("study.csv").lines().count(), 3);
 }

@@ -2,9 +2,8 @@
 
 use std::path::PathBuf;
 
-use clap::ValueEnum;
-
 use super::Global;
+use super::class::ClassArguments;
 use super::context::{RecipeArguments, lock_file, open_store};
 use super::exit::{Exit, Fault, say};
 use super::held;
@@ -13,7 +12,7 @@ use super::picture::Pictures;
 use super::run::{Ran, execute, options, tell};
 use super::signals::Interrupt;
 use crate::report::Status;
-use crate::report::lock::{Class, Lock, ingredients};
+use crate::report::lock::{Lock, ingredients};
 use crate::run;
 
 /// Run a recipe and lock it: `run --locked` then fails with 5 when anything differs.
@@ -23,12 +22,8 @@ use crate::run;
 pub(super) struct Arguments {
     #[command(flatten)]
     recipe: RecipeArguments,
-    /// How results are compared: by bytes, by metrics, or by metrics within --tolerance.
-    #[arg(long, value_name = "CLASS", default_value = "bytes")]
-    class: ClassName,
-    /// Largest relative difference of a metric, for the class `tolerance`.
-    #[arg(long, value_name = "NUMBER", default_value_t = 1e-6)]
-    tolerance: f64,
+    #[command(flatten)]
+    class: ClassArguments,
     /// The lock file. Default: `NAME.lock.ron` beside the recipe.
     #[arg(long, value_name = "FILE")]
     to: Option<PathBuf>,
@@ -42,17 +37,8 @@ pub(super) struct Arguments {
     memory: MemoryArguments,
 }
 
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum ClassName {
-    Bytes,
-    Metrics,
-    Tolerance,
-}
-
 pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Fault> {
-    if !(0.0..1.0).contains(&arguments.tolerance) {
-        return Err(Fault::usage("--tolerance is a number from 0 to less than 1: 0.001 is one in a thousand"));
-    }
+    let (class, tolerance) = arguments.class.read()?;
     let planned = arguments.recipe.plan()?;
     let store = open_store(global)?;
     let interrupt = Interrupt::listen();
@@ -69,12 +55,6 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Fault>
         say("nothing was locked");
         return Ok(if cancelled { interrupt.exit() } else { report.status.into() });
     }
-    let class = match arguments.class {
-        ClassName::Bytes => Class::Bytes,
-        ClassName::Metrics => Class::Metrics,
-        ClassName::Tolerance => Class::Tolerance,
-    };
-    let tolerance = if class == Class::Tolerance { arguments.tolerance } else { 0.0 };
     let lock = Lock { class, tolerance, ..before.with_results(&report, &options.out) };
     let text = lock.to_ron().map_err(|error| Fault::new(Exit::Fault, format!("cannot write the lock: {error}")))?;
     let written: Vec<PathBuf> = report.written().collect();

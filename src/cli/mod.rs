@@ -4,8 +4,10 @@
 //! that decides which steps there are: it hands the catalog down.
 
 mod best;
+mod bundle;
 mod cache;
 mod check;
+mod class;
 mod completions;
 mod config;
 mod context;
@@ -34,6 +36,7 @@ mod sweep;
 mod tables;
 mod trace;
 mod unchanged;
+mod verify;
 mod watch;
 
 use std::path::PathBuf;
@@ -88,6 +91,8 @@ enum Command {
     Sweep(sweep::Arguments),
     Watch(watch::Arguments),
     Lock(lock::Arguments),
+    Bundle(bundle::Arguments),
+    Verify(verify::Arguments),
     Init(init::Arguments),
     Check(check::Arguments),
     Plan(plan::Arguments),
@@ -127,6 +132,8 @@ pub fn main(meter: Meter) -> ExitCode {
         Command::Sweep(command) => sweep::run(command, global),
         Command::Watch(command) => watch::run(command, global),
         Command::Lock(command) => lock::run(command, global),
+        Command::Bundle(command) => bundle::run(command, global),
+        Command::Verify(command) => verify::run(command, global),
         Command::Init(command) => init::run(command),
         Command::Check(command) => check::run(command),
         Command::Plan(command) => plan::run(command, global),

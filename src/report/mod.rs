@@ -4,6 +4,7 @@
 //! repeats from run to run stands apart from `timings`, which does not.
 
 mod advice;
+pub mod bundle;
 pub mod diff;
 pub mod json;
 pub mod junit;
@@ -77,6 +78,9 @@ pub struct CaseReport {
     pub name: String,
     /// Parameters with their values, as they would be written.
     pub params: BTreeMap<String, String>,
+    /// Paths of the input files by the names that the recipe gives them.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub inputs: BTreeMap<String, String>,
     /// Steps, in the order of the graph.
     pub steps: Vec<StepReport>,
     /// Gates, by step.
@@ -313,6 +317,7 @@ impl CaseReport {
         Self {
             name: case.name.clone(),
             params: case.params.clone(),
+            inputs: case.inputs.clone(),
             steps: steps.into_iter().filter_map(|(id, name)| step_report(&names, outcome, (id, name))).collect(),
             gates,
             files: files.collect(),

@@ -70,6 +70,7 @@ mod tests {
         let case = CaseReport {
             name: String::new(),
             params: BTreeMap::from([("size".to_owned(), "2%".to_owned())]),
+            inputs: BTreeMap::from([("part".to_owned(), "a.stl".to_owned())]),
             steps: vec![step],
             gates: Vec::new(),
             files: Vec::new(),

@@ -44,7 +44,14 @@ fn report(steps: Vec<StepReport>, gates: Vec<GateSection>, files: Vec<FileReport
         description: String::new(),
         texts: Vec::new(),
         status: Status::GateFailed,
-        cases: vec![CaseReport { name: String::new(), params: BTreeMap::new(), steps, gates, files }],
+        cases: vec![CaseReport {
+            name: String::new(),
+            params: BTreeMap::new(),
+            inputs: BTreeMap::new(),
+            steps,
+            gates,
+            files,
+        }],
         inputs: BTreeMap::new(),
         timings: Timings::default(),
     }
