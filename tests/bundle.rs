@@ -273,7 +273,9 @@ fn a_bundle_that_cannot_be_read_ends_with_2() {
     let mut damaged = whole.clone();
     damaged[whole.len() / 3] ^= 0xff;
     cut(&damaged);
-    desk.meshmill(&["verify", "nothing.zip"]).assert().code(2);
+    for other in ["nothing.zip", "lab", "/dev/zero"] {
+        desk.meshmill(&["verify", other]).assert().code(2);
+    }
     let changes: BTreeMap<&str, (&str, &str)> = BTreeMap::from([
         ("ro-crate-metadata.json", ("{", "[")),
         ("meshmill.json", ("\"layout\": 1", "\"layout\": 2")),
@@ -311,6 +313,8 @@ fn a_bundle_reads_nothing_outside_of_itself() {
         ("meshmill.json", "files/parts/cube.obj", "../secret.obj"),
         ("meshmill.json", "files/parts/cube.obj", secret.to_str().unwrap()),
         ("meshmill.json", "files/recipe.toml", "files/../../recipe.toml"),
+        ("meshmill.json", "\"left_out\": {}", "\"left_out\": { \"files/lab\": \"00\" }"),
+        ("meshmill.json", "\"left_out\": {}", "\"left_out\": { \"files/../x\": \"00\" }"),
     ] {
         fs::write(desk.path("part.zip"), &whole).unwrap();
         desk.change(&|members| replace(members, name, from, to));

@@ -313,13 +313,14 @@ fn every_command_of_the_walk_through_does_what_it_says() {
             let script = [exported.clone(), vec![line]].concat().join("\n");
             let mut command = Command::new("sh");
             command.args(["-c", &script]).current_dir(desk.path("")).env("PATH", &path);
-            let output = command.env("MESHMILL_CACHE", desk.path("cache")).output().unwrap();
+            command.env("XDG_CACHE_HOME", desk.path("home")).env("XDG_CONFIG_HOME", desk.path("home"));
+            let output = command.env_remove("MESHMILL_CACHE").output().unwrap();
             let said = String::from_utf8_lossy(&output.stderr);
             assert_eq!(output.status.code(), Some(expected), "{line}\n{said}");
             commands += 1;
         }
     }
-    assert!(files == 3 && commands > 12, "{files} files, {commands} commands");
+    assert!(files == 4 && commands > 15, "{files} files, {commands} commands");
     // What the page promises of them.
     assert!(desk.text("tests.xml").contains("<testsuite"));
     let record = desk.text("second/run.ron");

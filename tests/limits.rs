@@ -1,5 +1,15 @@
 //! Limits of time and memory: what is over them fails, says what to change, and takes nothing else along.
 
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use meshmill::plan::{Context, plan};
+use meshmill::recipe::{Overrides, Recipe};
+use meshmill::run::{self, Event, Observer, RunError, RunOptions, TaskState};
+use meshmill::steps::CATALOG;
+use meshmill::store::Store;
 use predicates::prelude::*;
 use serde_json::{Value, json};
 
@@ -28,9 +38,9 @@ file = "=inputs.part"
 use = "repair"
 from = "raw"
 [steps.fine]
-use = "remesh"
+use = "refine"
 from = "clean"
-max-size = "20%"
+max-edge = "20%"
 [steps.told]
 use = "measure"
 from = "clean"
@@ -159,7 +169,43 @@ fn what_a_limit_ended_is_tried_again_and_a_steps_own_failure_is_not() {
     assert_eq!(told["message"], "took longer than its limit of 0.000000001 s, 3 times");
     desk.write("recipe.toml", &with_limits("memory = 1, retries = 1"));
     assert_eq!(failure(&desk.report(4, &[]))["message"], "took more memory than its limit of 1 B, 2 times");
-    desk.write("recipe.toml", &with_limits("retries = 5").replace("max-size = \"20%\"", "max-size = 1e-30"));
+    desk.write("recipe.toml", &with_limits("retries = 5").replace("max-edge = \"20%\"", "max-edge = 1e-30"));
     let told = failure(&desk.report(4, &[]));
     assert!(told["kind"] == "failed" && !told["message"].as_str().unwrap().contains("times"), "{told}");
+}
+
+/// Takes away what is in the way of `fine.obj`, when the file is to be written for the second time.
+struct Mender {
+    tries: AtomicUsize,
+    obstacle: PathBuf,
+}
+
+impl Observer for Mender {
+    fn event(&self, event: &Event<'_>) {
+        if matches!(event, Event::State { label: "fine.obj", state: TaskState::Running, .. })
+            && self.tries.fetch_add(1, Ordering::Relaxed) == 1
+        {
+            fs::remove_dir_all(&self.obstacle).unwrap();
+        }
+    }
+}
+
+#[test]
+fn a_file_that_the_disk_did_not_take_is_written_again() {
+    let desk = Desk::new();
+    let run = |limits: &str, out: &str| {
+        let text = with_limits(limits);
+        let loader = |_: &Path| Ok(text.clone());
+        let recipe = Recipe::load(&desk.path("recipe.toml"), &loader, &Overrides::default()).unwrap();
+        let context = Context { catalog: CATALOG, check_file: &|_| Ok(()), endings: &["obj"], second_order: &[] };
+        let plan = plan(&recipe, &context).unwrap();
+        let obstacle = desk.path(out).join("fine.obj");
+        fs::create_dir_all(obstacle.join("full")).unwrap();
+        let mender: Arc<dyn Observer> = Arc::new(Mender { tries: AtomicUsize::new(0), obstacle });
+        let store = Store::open(&desk.path("cache")).unwrap();
+        run::run(&plan, &store, &RunOptions::new("part", desk.path(out), 2), &mender)
+    };
+    assert!(matches!(run("retries = 0", "first"), Err(RunError::Output { .. })));
+    run("retries = 1", "second").unwrap();
+    assert!(desk.text("second/fine.obj").contains("\nf "));
 }

@@ -76,6 +76,10 @@ pub(super) fn run(arguments: &Arguments, global: &Global) -> Result<Exit, Fault>
 }
 
 fn bytes(path: &Path) -> Result<Vec<u8>, Fault> {
+    // A pipe may have no end, and never begin.
+    if fs::metadata(path).is_ok_and(|meta| !meta.is_file()) {
+        return Err(Fault::usage(format!("{} is no file", path.display())).help("name a bundle"));
+    }
     let mut bytes = Vec::new();
     let read = fs::File::open(path).and_then(|file| file.take(LONGEST + 1).read_to_end(&mut bytes));
     read.map_err(|error| Fault::usage(format!("cannot read {}: {error}", path.display())))?;

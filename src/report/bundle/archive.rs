@@ -56,6 +56,9 @@ pub enum ArchiveError {
     /// Two members have one name, or names that differ in case only.
     #[error("two of its members are called {0}")]
     Twice(String),
+    /// A member is called as the folder of another one.
+    #[error("its member {0} is called as a folder")]
+    Folder(String),
     /// Two members share data.
     #[error("two of its members share their data")]
     Overlap,
@@ -170,7 +173,20 @@ pub fn read(bytes: &[u8]) -> Result<Members, ArchiveError> {
     if ranges.windows(2).any(|pair| pair[0].1 > pair[1].0) {
         return Err(ArchiveError::Overlap);
     }
-    Ok(members)
+    match folder_among(members.keys()) {
+        Some(name) => Err(ArchiveError::Folder(name)),
+        None => Ok(members),
+    }
+}
+
+/// The first of these names, in their order, that is the folder of another one, whatever its case.
+pub(super) fn folder_among<'a>(names: impl Iterator<Item = &'a String> + Clone) -> Option<String> {
+    let folded = |name: &str| name.to_lowercase();
+    let folders: BTreeSet<String> = names
+        .clone()
+        .flat_map(|name| name.match_indices('/').map(|(at, _)| folded(&name[..at])).collect::<Vec<_>>())
+        .collect();
+    names.filter(|name| folders.contains(&folded(name))).min().cloned()
 }
 
 /// The content of a member, which is as long as was promised and has the checksum that it should.
@@ -225,6 +241,10 @@ mod tests {
             assert!(matches!(write(&members(&[(name, b"x")])), Err(ArchiveError::Name(_))), "{name}");
         }
         assert!(matches!(write(&members(&[("a", b"1"), ("A", b"2")])), Err(ArchiveError::Twice(_))));
+        for names in [["a/b", "A"], ["a", "a/b/c"]] {
+            let bytes = write(&members(&names.map(|name| (name, &b"1"[..])))).unwrap();
+            assert!(matches!(read(&bytes), Err(ArchiveError::Folder(_))), "{names:?}");
+        }
         // As others write them: the name of a member with another one of equal length in its place.
         let bytes = write(&members(&[("aaaa", b"1"), ("bbbb", b"2")])).unwrap();
         let renamed = |from: &[u8], to: &[u8]| {

@@ -194,6 +194,9 @@ impl Bundle {
         if let Some(name) = inputs.values().chain(left_out.keys()).chain([recipe]).find(odd) {
             return Err(BundleError::Member(MANIFEST.to_owned(), format!("it names {name:?}")));
         }
+        if let Some(name) = archive::folder_among(self.members.keys().chain(left_out.keys())) {
+            return Err(archive::ArchiveError::Folder(name).into());
+        }
         let there = |name: &&String| self.members.contains_key(*name) || left_out.contains_key(*name);
         match inputs.values().find(|name| !there(name)) {
             Some(name) => Err(BundleError::Missing(name.clone())),
