@@ -47,6 +47,12 @@ impl Watch {
         Self { expired: Some(expired), ..self.clone() }
     }
 
+    /// A watch that nobody looks at and that is cancelled when this one is: for one of many parts of a phase.
+    #[must_use]
+    pub fn quiet(&self) -> Self {
+        Self { progress: None, ..self.clone() }
+    }
+
     /// Whether somebody wants the step to stop.
     #[inline]
     pub fn is_cancelled(&self) -> bool {

@@ -2,7 +2,8 @@
 //!
 //! # Algorithm
 //! Selective subdivision first, until no edge is longer than `max-edge`: the freedom that collapse needs. Then the
-//! collapse that improves its star most, relative to its size, again and again while the tolerance allows.
+//! collapse that improves its star most, relative to its size, again and again while the tolerance allows. Surfaces of
+//! hundreds of thousands of faces are first simplified in cells, on all threads ([`crate::technique::cells`]).
 //!
 //! Based on: H. Date, S. Kanai, T. Kishinami, I. Nishigaki, T. Dohi. High-Quality and Property Controlled Finite
 //! Element Mesh Generation From Triangular Meshes using the Multiresolution Technique. JCISE 5(4), 2005, section 4.
@@ -32,6 +33,7 @@ use crate::step::{
     Artifact, InputDef, Inputs, Length, Locks, OutPort, OutputDef, Port, Produced, REFERENCE, ResolvedSizing, Sizing,
     StepFailure, Tolerance, ToleranceError,
 };
+use crate::technique::cells::{Task, Thinned, thin};
 use crate::technique::collapse::{CollapseRules, Ending, Goal, Order, Priority, simplify};
 use crate::technique::guarded::{
     Counts, GuardedMesh, Limits, Setup, SizeField, StarRules, diagonal, open, recount, reference_tree,
@@ -39,7 +41,7 @@ use crate::technique::guarded::{
 use crate::technique::hierarchy::{Front, extract};
 use crate::technique::levels::{HierarchyReport, Recorded, Source, build};
 use crate::technique::refine::{Flips, MAX_FACES, MaxEdge, RefineError, refine};
-use crate::technique::remesh::coarsen;
+use crate::technique::remesh::{coarsen, comfortable};
 use crate::watch::{Cancelled, Watch};
 
 /// Stretch that collapses do not fall below where their star was above it: the usual floor for analysis.
@@ -194,9 +196,18 @@ pub fn improve_quality(
     let freedom = resolve_freedom(surface, &input.locks)?;
     let setup = setup(&input, params, sizing, scale)?;
     let tree = reference_tree(params.tolerance_mode, input.reference);
-    let mut guarded = open(surface, &freedom, input.reference, &tree, setup.clone())?;
+    let thinned = thinned(surface, &input, params, &setup, watch)?;
+    let mut guarded = match &thinned {
+        None => open(surface, &freedom, input.reference, &tree, setup.clone())?,
+        Some(thinned) => {
+            let freedom = resolve_freedom(&thinned.surface, &input.locks)?;
+            let mut guarded = open(&thinned.surface, &freedom, input.reference, &tree, setup.clone())?;
+            thinned.hand_over(&mut guarded);
+            guarded
+        }
+    };
     let ending = run_phases(&mut guarded, params, watch)?;
-    let counts = guarded.counts();
+    let counts = guarded.counts() + thinned.as_ref().map_or_else(Counts::default, |thinned| thinned.counts);
     let distance_bound = if lies_on_reference(&input) && counts.edits() == 0 {
         // Refinement alone leaves the surface the same set of points.
         guarded.distance_bound(setup.tolerance).map(|_| 0.0)
@@ -209,6 +220,19 @@ pub fn improve_quality(
     let end = End { target_reached, faces_refined: surface.faces.len(), counts, distance_bound };
     let stats = stats(&input, &setup, &result, end)?;
     Ok((result, stats))
+}
+
+/// A large surface simplified in cells on the way to fewer faces.
+fn thinned(
+    surface: &Surface,
+    input: &ImproveQualityInput<'_>,
+    params: &ImproveQualityParams,
+    setup: &Setup,
+    watch: &Watch,
+) -> Result<Option<Thinned>, ImproveQualityError> {
+    let rules = if optimises(params) { comfortable(&rules(params), false) } else { rules(params) };
+    let faces = params.target_faces.unwrap_or(0);
+    thin(&Task { surface, reference: input.reference, locks: input.locks, setup, rules: &rules, faces }, watch)
 }
 
 /// Whether the surface is its own reference.
@@ -375,7 +399,7 @@ pub struct Step;
 
 impl crate::step::Step for Step {
     const NAME: &'static str = "improve-quality";
-    const REVISION: u32 = 18;
+    const REVISION: u32 = 19;
     const INPUTS: &'static [InputDef] = &[
         InputDef { name: "from", accepts: &[Port::Surface], required: true, doc: "the surface to improve" },
         REFERENCE,

@@ -5,6 +5,7 @@ pub mod arcs;
 pub mod arrange;
 pub mod aspect_point;
 pub mod belts;
+pub mod cells;
 pub mod clean_quads;
 pub mod collapse;
 pub mod curvature;

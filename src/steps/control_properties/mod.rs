@@ -4,7 +4,8 @@
 //! Phase A changes only what breaks the stretch threshold, until nothing does. Phase B collapses the edges that keep
 //! all thresholds C1 to C4, smallest and best first. With `optimize`, rounds of flips, splits and relaxation go in
 //! between, under the same tests. Where the mean stretch ends slightly below the one asked for, because the repairs at
-//! the end cost more than was allowed for, all is done again with a higher aim, twice at most.
+//! the end cost more than was allowed for, all is done again with a higher aim, twice at most. Surfaces of hundreds of
+//! thousands of faces are first simplified in cells, on all threads ([`crate::technique::cells`]).
 //!
 //! Based on: H. Date, S. Kanai, T. Kishinami, I. Nishigaki, T. Dohi. High-Quality and Property Controlled Finite
 //! Element Mesh Generation From Triangular Meshes using the Multiresolution Technique. JCISE 5(4), 2005, section 5.
@@ -43,12 +44,15 @@ use crate::step::{
     Artifact, InputDef, Inputs, Length, Locks, OutOfRange, OutPort, OutputDef, Port, Produced, REFERENCE,
     ResolvedSizing, Sizing, StepFailure, Tolerance,
 };
+use crate::technique::cells::{Task, Thinned, thin};
 use crate::technique::collapse::{CollapseRules, Ending, Goal, Order, Priority, simplify};
-use crate::technique::guarded::{GuardedMesh, Limits, Setup, SizeField, StarRules, diagonal, open, reference_tree};
+use crate::technique::guarded::{
+    Counts, GuardedMesh, Limits, Setup, SizeField, StarRules, diagonal, open, reference_tree,
+};
 use crate::technique::hierarchy::{Front, extract};
 use crate::technique::levels::{HierarchyReport, Recorded, Source, build};
 use crate::technique::refine::MAX_FACES;
-use crate::technique::remesh::{coarsen, raise_stretch};
+use crate::technique::remesh::{coarsen, comfortable, raise_stretch};
 use crate::watch::{Cancelled, Watch};
 
 /// Simplifies a surface while error, element shape, element size and valence stay within limits.
@@ -167,10 +171,16 @@ pub fn control_properties(
     let freedom = resolve_freedom(input.surface, &input.locks)?;
     let tree = reference_tree(params.tolerance_mode, input.reference);
     let setup = setup(&input, params, diagonal(input.reference))?;
+    let thinned = thinned(&input, params, &setup, watch)?;
+    let freedom = thinned.as_ref().map_or(Ok(freedom), |thinned| resolve_freedom(&thinned.surface, &input.locks))?;
     let simplified = |mean_stretch: f64| -> Result<(Surface, ControlPropertiesStats), ControlPropertiesError> {
-        let mut guarded = open(input.surface, &freedom, input.reference, &tree, setup.clone())?;
+        let surface = thinned.as_ref().map_or(input.surface, |thinned| &thinned.surface);
+        let mut guarded = open(surface, &freedom, input.reference, &tree, setup.clone())?;
+        if let Some(thinned) = &thinned {
+            thinned.hand_over(&mut guarded);
+        }
         let ending = run_phases(&mut guarded, params, mean_stretch, watch)?;
-        let counts = guarded.counts();
+        let counts = guarded.counts() + thinned.as_ref().map_or_else(Counts::default, |thinned| thinned.counts);
         let distance_bound = guarded.distance_bound(setup.tolerance);
         let mut result = guarded.into_mesh().leave().surface;
         inherit_fields(input.surface, &mut result);
@@ -191,6 +201,22 @@ pub fn control_properties(
         OnInfeasible::Report => {}
     }
     Ok((result, stats))
+}
+
+/// A large surface simplified in cells, where nothing but the number of faces says how far.
+fn thinned(
+    input: &ControlPropertiesInput<'_>,
+    params: &ControlPropertiesParams,
+    setup: &Setup,
+    watch: &Watch,
+) -> Result<Option<Thinned>, ControlPropertiesError> {
+    let ControlPropertiesInput { surface, reference, locks } = *input;
+    if params.mean_stretch > 0.0 && !optimises(params) {
+        return Ok(None);
+    }
+    let rules = if optimises(params) { comfortable(&rules(params), params.mean_stretch > 0.0) } else { rules(params) };
+    let faces = params.target_faces.unwrap_or(0);
+    thin(&Task { surface, reference, locks, setup, rules: &rules, faces }, watch)
 }
 
 /// The mean stretch to ask for where coarsening has gone too far by little: how much repairs and the last rounds cost
@@ -313,7 +339,7 @@ pub struct Step;
 
 impl crate::step::Step for Step {
     const NAME: &'static str = "control-properties";
-    const REVISION: u32 = 19;
+    const REVISION: u32 = 20;
     const INPUTS: &'static [InputDef] = &[
         InputDef { name: "from", accepts: &[Port::Surface], required: true, doc: "the surface to simplify" },
         REFERENCE,

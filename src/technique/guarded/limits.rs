@@ -1,5 +1,7 @@
 //! Thresholds on elements: what the faces round a changed vertex must keep.
 
+use std::sync::Arc;
+
 use glam::DVec3;
 
 use crate::mesh::Surface;
@@ -13,16 +15,16 @@ pub enum SizeField {
     /// Values at the corners of the faces of a surface, interpolated at its nearest point.
     Varying {
         /// The faces that the values belong to.
-        tree: TriangleBvh,
+        tree: Arc<TriangleBvh>,
         /// Three values a face.
-        values: Vec<[f64; 3]>,
+        values: Arc<[[f64; 3]]>,
     },
 }
 
 impl SizeField {
     /// A field with three values a face of `surface`.
     pub fn varying(surface: &Surface, values: Vec<[f64; 3]>) -> Self {
-        Self::Varying { tree: TriangleBvh::of_surface(surface), values }
+        Self::Varying { tree: Arc::new(TriangleBvh::of_surface(surface)), values: values.into() }
     }
 
     /// The length at a point.

@@ -16,6 +16,7 @@ use super::keeper::Keeper;
 use super::limits::Limits;
 use super::normals::{HAS_NORMAL, agree};
 use super::patch::Patch;
+use super::pen::Pen;
 use super::quadrics::Quadrics;
 use super::refused::Refused;
 use super::star::{Shape, Star};
@@ -78,6 +79,8 @@ pub struct GuardedMesh<'a> {
     pub(super) shapes: Vec<Shape>,
     pub(super) recorder: Option<Box<Recorder>>,
     pub(super) ties: Ties,
+    /// Where this is a part of a larger mesh.
+    pub(super) pen: Option<Pen>,
     collision: Collision,
     /// Edits done, to tell plans that are out of date.
     pub(super) age: u64,
@@ -98,6 +101,7 @@ impl<'a> GuardedMesh<'a> {
             star: Star::default(),
             recorder: None,
             ties: Ties::default(),
+            pen: None,
             age: 0,
         };
         let faces: Vec<FaceId> = this.mesh.faces().collect();
@@ -271,13 +275,16 @@ impl GuardedMesh<'_> {
         self.patch = patch;
         match admitted {
             Err(Refused::Tolerance) => self.counts.refused_by_tolerance += 1,
-            Err(_) => self.counts.refused_by_intersection += 1,
-            Ok(()) => {}
+            Err(Refused::Intersection) => self.counts.refused_by_intersection += 1,
+            Err(_) | Ok(()) => {}
         }
         admitted
     }
 
     fn costly_tests(&mut self, patch: &mut Patch) -> Result<(), Refused> {
+        if self.pen.as_ref().is_some_and(|pen| pen.bars(patch)) {
+            return Err(Refused::Extent);
+        }
         let mut is_sheet = false;
         if let Keeper::Distance { envelope, .. } = &mut self.keeper {
             patch.beside.clear();

@@ -7,9 +7,10 @@ use super::corners::free_close_corners;
 use super::keeper::{Curves, Keeper};
 use super::limits::Limits;
 use super::mesh::GuardedMesh;
+use super::pen::Pen;
 use crate::mesh::bvh::TriangleBvh;
 use crate::mesh::geometry::Aabb;
-use crate::mesh::halfedge::{EnterError, HalfedgeMesh};
+use crate::mesh::halfedge::{EnterError, HalfedgeMesh, halfedge_of, twin};
 use crate::mesh::{Freedom, ResolvedFreedom, Surface};
 use crate::metric::ToleranceMode;
 
@@ -72,6 +73,35 @@ pub fn open<'a>(
         }
     };
     Ok(GuardedMesh::new(mesh, keeper, setup.limits, setup.feature_weight))
+}
+
+/// Opens a guarded mesh on a part of a larger surface, held against itself, in a pen; `tree` is [`reference_tree`].
+///
+/// # Errors
+/// A part that is no oriented 2-manifold.
+pub fn open_part<'a>(
+    part: &'a Surface,
+    freedom: &ResolvedFreedom,
+    tree: &'a TriangleBvh,
+    setup: Setup,
+    pen: Pen,
+) -> Result<GuardedMesh<'a>, EnterError> {
+    let reach = setup.feature_tolerance;
+    let mut guarded = open(part, freedom, part, tree, setup)?;
+    if let Keeper::Distance { curves, .. } = &mut guarded.keeper {
+        // Where the part was cut out is no rim.
+        let mesh = &guarded.mesh;
+        let is_cut = |e| {
+            let h = halfedge_of(e);
+            let faces = [mesh.face(h), mesh.face(twin(h))];
+            mesh.is_boundary_edge(e) && faces.into_iter().flatten().all(|f| pen.is_fixed(f))
+        };
+        let edges = mesh.edges().filter(|&e| mesh.edge_freedom(e) != Freedom::Free && !is_cut(e));
+        *curves = Curves::new(edges.map(|e| mesh.ends(e).map(|v| mesh.point(v))).collect(), reach);
+    }
+    guarded.take_over(pen.origin, std::iter::empty());
+    guarded.pen = Some(pen);
+    Ok(guarded)
 }
 
 /// The curves that marked edges are held against: the reference's own where it has any, and those of the mesh.

@@ -8,11 +8,27 @@ use crate::mesh::halfedge::{HalfedgeMesh, halfedge_of, twin};
 use crate::mesh::{EdgeId, FaceId, Freedom, VertexId};
 use crate::technique::quadric::Quadric;
 
+/// What a vertex has gathered.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Gathered {
+    pub(super) planes: Quadric,
+    pub(super) lines: Quadric,
+}
+
+impl Gathered {
+    /// How many planes, each counted once for every vertex that began with it.
+    pub fn planes(&self) -> f64 {
+        self.planes.trace()
+    }
+}
+
 /// Plane and line quadrics of the vertices, about a local origin.
 #[derive(Debug, Default)]
 pub(super) struct Quadrics {
     /// What the quadrics are about.
     pub(super) origin: DVec3,
+    /// The weight of the sharpest marked edges.
+    feature_weight: f64,
     planes: Vec<Quadric>,
     lines: FxHashMap<VertexId, Quadric>,
 }
@@ -22,12 +38,20 @@ impl Quadrics {
     pub(super) fn new(mesh: &HalfedgeMesh, feature_weight: f64) -> Self {
         let bounds = Aabb::of(mesh.vertices().map(|v| mesh.point(v)));
         let origin = if bounds.is_empty() { DVec3::ZERO } else { bounds.centre() };
-        let mut this =
-            Self { origin, planes: vec![Quadric::default(); mesh.vertex_slots()], lines: FxHashMap::default() };
+        let mut this = Self { feature_weight, ..Self::default() };
+        this.begin(mesh, origin);
+        this
+    }
+
+    /// Begins anew with the faces and marked edges of `mesh`.
+    pub(super) fn begin(&mut self, mesh: &HalfedgeMesh, origin: DVec3) {
+        self.origin = origin;
+        self.planes = vec![Quadric::default(); mesh.vertex_slots()];
+        self.lines.clear();
         for f in mesh.faces() {
-            if let Some(plane) = this.plane(mesh, f) {
+            if let Some(plane) = self.plane(mesh, f) {
                 for v in mesh.corners(f) {
-                    this.planes[v.index()].add(&plane);
+                    self.planes[v.index()].add(&plane);
                 }
             }
         }
@@ -35,12 +59,19 @@ impl Quadrics {
             let [a, b] = mesh.ends(e);
             let (p, q) = (mesh.point(a) - origin, mesh.point(b) - origin);
             if let Some(direction) = (q - p).try_normalize() {
-                let line = Quadric::line(direction, p, feature_weight * sharpness(mesh, e));
-                this.lines.entry(a).or_default().add(&line);
-                this.lines.entry(b).or_default().add(&line);
+                let line = Quadric::line(direction, p, self.feature_weight * sharpness(mesh, e));
+                self.lines.entry(a).or_default().add(&line);
+                self.lines.entry(b).or_default().add(&line);
             }
         }
-        this
+    }
+
+    /// Gives a vertex what it had gathered elsewhere, about the same origin.
+    pub(super) fn set(&mut self, v: VertexId, gathered: Gathered) {
+        self.planes[v.index()] = gathered.planes;
+        if gathered.lines != Quadric::default() {
+            self.lines.insert(v, gathered.lines);
+        }
     }
 
     fn plane(&self, mesh: &HalfedgeMesh, f: FaceId) -> Option<Quadric> {

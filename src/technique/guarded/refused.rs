@@ -17,7 +17,7 @@ pub enum Refused {
     /// A vertex would have too many edges.
     #[error("a vertex would have too many edges")]
     Valence,
-    /// More faces would change than a transaction holds.
+    /// More faces would change than a transaction holds, or others than those of the part that is worked on.
     #[error("too many faces would change at once")]
     Extent,
     /// All thresholds hold, but the edit does not gain what was asked of it.

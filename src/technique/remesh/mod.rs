@@ -138,6 +138,13 @@ pub fn coarsen_purely(
     simplify(guarded, rules, Goal::default(), watch)
 }
 
+/// The rules of a step that [`coarsen`] takes in any case: of the last one, or where the mean stretch has a goal, which
+/// poor stars would take away, of the first.
+pub fn comfortable(rules: &CollapseRules, has_mean_goal: bool) -> CollapseRules {
+    let (least, mean) = descent::COMFORT[if has_mean_goal { 0 } else { descent::COMFORT.len() - 1 }];
+    careful(rules, least, mean)
+}
+
 /// The same rules with more asked of new stars.
 fn careful(rules: &CollapseRules, least: f64, mean_stretch: f64) -> CollapseRules {
     let star = StarRules { min_stretch: least.max(rules.star.min_stretch), mean_stretch, ..rules.star };
