@@ -209,3 +209,36 @@ fn a_file_that_the_disk_did_not_take_is_written_again() {
     run("retries = 1", "second").unwrap();
     assert!(desk.text("second/fine.obj").contains("\nf "));
 }
+
+#[test]
+fn many_over_their_memory_at_once_all_fail_and_none_waits_for_ever() {
+    let desk = Desk::new();
+    let mut text = with_limits("memory = \"1 kB\"").replace("[outputs]", "");
+    for (number, edge) in ["25%", "20%", "15%", "12%", "10%", "8%"].into_iter().enumerate() {
+        let step = format!("[steps.more-{number}]\nuse = \"refine\"\nfrom = \"clean\"\nmax-edge = \"{edge}\"\n");
+        text = text.replace("[limits.steps]\n", &format!("[limits.steps]\nmore-{number} = {{ memory = 1 }}\n"));
+        text = text.replace("[steps.told]", &format!("{step}[steps.told]"));
+    }
+    let (head, _) = text.split_once("fine = \"fine.obj\"").unwrap();
+    let names: Vec<String> = (0..6).map(|number| format!("more-{number}")).collect();
+    let outputs: Vec<String> = names.iter().map(|name| format!("{name} = \"{name}.obj\"\n")).collect();
+    desk.write("recipe.toml", &format!("{head}[outputs]\nclean = \"clean.obj\"\n{}", outputs.concat()));
+    let report = desk.report(4, &["--jobs", "6"]);
+    let steps = report["cases"][0]["steps"].as_array().unwrap();
+    let kinds: Vec<_> =
+        steps.iter().filter(|step| !step["failure"].is_null()).map(|step| &step["failure"]["kind"]).collect();
+    // `fine` and one of the others are the same task.
+    assert_eq!(kinds, vec![&json!("over-memory"); 7], "{report}");
+    assert!(desk.path("out/part/clean.obj").exists());
+}
+
+#[test]
+fn the_example_of_the_documentation_is_right() {
+    let page = include_str!("../docs/limits.md");
+    let example = page.split("```toml\n").nth(1).unwrap().split("```").next().unwrap().replace("fe = {", "fine = {");
+    let (head, rest) = RECIPE.split_once("[limits]").unwrap();
+    let (_, steps) = rest.split_once("[steps.raw]").unwrap();
+    let desk = Desk::new();
+    desk.write("recipe.toml", &format!("{head}{example}[steps.raw]{steps}").replace("[params]\ntime = \"1 h\"\n", ""));
+    desk.run(&[]).success();
+}

@@ -8,11 +8,12 @@
 //!   beside others is stopped, and may try again alone.
 //!
 //! # Cost
-//! A thread for each step that runs, which looks every five milliseconds.
+//! One thread for a run, from its first step on, which looks at the steps that run every five milliseconds.
 
-use std::sync::Arc;
+use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
-use std::sync::mpsc::{self, RecvTimeoutError};
+use std::sync::mpsc::{self, RecvTimeoutError, Sender};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -22,7 +23,7 @@ use crate::step::{FailureKind, StepFailure, amount};
 use crate::store::Peak;
 use crate::watch::Watch;
 
-/// How often memory is looked at. Nobody fills much in that time.
+/// How often the clock looks. Nobody fills much memory in that time, and no limit of time is that short.
 const TICK: Duration = Duration::from_millis(5);
 
 /// Which limit was passed first.
@@ -42,16 +43,20 @@ pub(super) enum Ended {
 /// when the work does.
 pub(super) fn bounded<T>(
     limits: TaskLimits,
-    account: &Account,
+    (account, clock): (&Arc<Account>, &Clock),
     watch: &Watch,
     work: &dyn Fn(&Watch) -> Result<T, StepFailure>,
 ) -> Result<(T, Option<Peak>), Ended> {
     account.restart();
     let stop = Arc::new(AtomicBool::new(false));
-    let look = Look { limits, account, start: Instant::now(), passed: AtomicU8::new(NONE) };
-    let watched = || watched(&look, &stop, &|| work(&watch.limited(Arc::clone(&stop))));
-    let is_watched = limits.timeout.is_some() || account.peak().is_some();
-    let result = if is_watched { watched().map_err(Ended::Failed)? } else { work(watch) };
+    let look = Look { limits, account: Arc::clone(account), start: Instant::now(), passed: AtomicU8::new(NONE), stop };
+    let look = Arc::new(look);
+    let result = if limits.timeout.is_some() || account.peak().is_some() {
+        let _watched = clock.watch(&look).map_err(Ended::Failed)?;
+        work(&watch.limited(Arc::clone(&look.stop)))
+    } else {
+        work(watch)
+    };
     // The clock may come late.
     let (passed, peak) = (look.at(), account.peak());
     match (passed, result) {
@@ -64,44 +69,78 @@ pub(super) fn bounded<T>(
     }
 }
 
-/// Does some work beside a clock that sets `stop` when a limit is passed.
-fn watched<T>(look: &Look<'_>, stop: &AtomicBool, work: &dyn Fn() -> T) -> Result<T, StepFailure> {
-    thread::scope(|scope| {
-        let (ended, end) = mpsc::channel::<()>();
-        let clock = move || {
-            // The sender goes when the work has ended.
-            while end.recv_timeout(look.pause()) == Err(RecvTimeoutError::Timeout) {
-                if look.at() != NONE {
-                    return stop.store(true, Ordering::Relaxed);
-                }
-            }
-        };
-        thread::Builder::new().name("limits".to_owned()).spawn_scoped(scope, clock).map_err(|error| {
-            let message = format!("cannot watch its limits: {error}");
-            let failure = StepFailure::new(FailureKind::TimedOut, message);
+/// What the clock looks at, by number.
+type Looks = BTreeMap<u64, Arc<Look>>;
+
+/// Looks at the steps that run until it is dropped.
+#[derive(Default)]
+pub(super) struct Clock {
+    looks: Arc<Mutex<(u64, Looks)>>,
+    /// Goes with the clock, which ends its thread.
+    running: Mutex<Option<Sender<()>>>,
+}
+
+impl Clock {
+    /// Looks at one more, until what is returned is dropped.
+    fn watch(&self, look: &Arc<Look>) -> Result<Watched<'_>, StepFailure> {
+        self.start().map_err(|error| {
+            let failure = StepFailure::new(FailureKind::TimedOut, format!("cannot watch its limits: {error}"));
             failure.with_help("run fewer tasks at once with --jobs N")
         })?;
-        let result = work();
-        drop(ended);
-        Ok(result)
-    })
+        let mut looks = lock(&self.looks);
+        looks.0 += 1;
+        let number = looks.0;
+        looks.1.insert(number, Arc::clone(look));
+        Ok(Watched { clock: self, number })
+    }
+
+    /// Starts the thread, where it does not run yet.
+    fn start(&self) -> std::io::Result<()> {
+        let mut running = lock(&self.running);
+        if running.is_none() {
+            let (sender, end) = mpsc::channel();
+            let looks = Arc::clone(&self.looks);
+            let tick = move || {
+                while end.recv_timeout(TICK) == Err(RecvTimeoutError::Timeout) {
+                    for look in lock(&looks).1.values().filter(|look| look.at() != NONE) {
+                        look.stop.store(true, Ordering::Relaxed);
+                    }
+                }
+            };
+            thread::Builder::new().name("limits".to_owned()).spawn(tick)?;
+            *running = Some(sender);
+        }
+        Ok(())
+    }
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// A step that the clock looks at.
+struct Watched<'a> {
+    clock: &'a Clock,
+    number: u64,
+}
+
+impl Drop for Watched<'_> {
+    fn drop(&mut self) {
+        lock(&self.clock.looks).1.remove(&self.number);
+    }
 }
 
 /// Looks whether a limit was passed.
-struct Look<'a> {
+struct Look {
     limits: TaskLimits,
-    account: &'a Account,
+    account: Arc<Account>,
     start: Instant,
     passed: AtomicU8,
+    /// Ends the work.
+    stop: Arc<AtomicBool>,
 }
 
-impl Look<'_> {
-    /// How long to wait until the next look.
-    fn pause(&self) -> Duration {
-        let left = self.limits.timeout.map_or(TICK, |timeout| timeout.saturating_sub(self.start.elapsed()));
-        left.clamp(Duration::from_micros(100), TICK)
-    }
-
+impl Look {
     /// The limit that was passed first, now or before.
     fn at(&self) -> u8 {
         let peak = self.account.peak();
@@ -160,8 +199,18 @@ mod tests {
         TaskLimits { timeout: Some(timeout), ..TaskLimits::default() }
     }
 
-    fn account(meter: Option<Meter>) -> Account {
-        Arc::new(Ledger::new(meter)).open(0)
+    fn account(meter: Option<Meter>) -> Arc<Account> {
+        Arc::new(Arc::new(Ledger::new(meter)).open(0))
+    }
+
+    /// The same with a clock of its own.
+    fn bounded<T>(
+        limits: TaskLimits,
+        account: &Arc<Account>,
+        watch: &Watch,
+        work: &dyn Fn(&Watch) -> Result<T, StepFailure>,
+    ) -> Result<(T, Option<Peak>), Ended> {
+        super::bounded(limits, (account, &Clock::default()), watch, work)
     }
 
     fn failure<T>(ended: Result<(T, Option<Peak>), Ended>) -> StepFailure {
@@ -201,7 +250,7 @@ mod tests {
     fn what_takes_too_much_memory_fails_alone_and_is_crowded_beside_others() {
         let ledger = Arc::new(Ledger::new(Some(|| TAKEN.load(Ordering::Relaxed))));
         let limits = TaskLimits { memory: Some(1000), ..TaskLimits::default() };
-        let own = ledger.open(0);
+        let own = Arc::new(ledger.open(0));
         let take = |bytes| {
             move |watch: &Watch| {
                 TAKEN.fetch_add(bytes, Ordering::Relaxed);

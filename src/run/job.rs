@@ -37,7 +37,7 @@ impl Progress for NodeProgress {
 pub(super) fn run(shared: &Shared<'_>, index: usize, node: Node, observer: Arc<dyn Observer>) -> Finished {
     let progress = Arc::new(NodeProgress { node: index, observer });
     let watch = Watch::new(progress, Arc::clone(&shared.options.cancelled));
-    let account = shared.ledger.open(index);
+    let account = Arc::new(shared.ledger.open(index));
     let work = || match node {
         Node::Task(id) => task(shared, id, &account, &watch),
         Node::File(case, position) => output::file(shared, case, position, &watch),
@@ -48,7 +48,7 @@ pub(super) fn run(shared: &Shared<'_>, index: usize, node: Node, observer: Arc<d
         .unwrap_or_else(|finished| finished)
 }
 
-fn task(shared: &Shared<'_>, id: TaskId, account: &Account, watch: &Watch) -> Result<Finished, Finished> {
+fn task(shared: &Shared<'_>, id: TaskId, account: &Arc<Account>, watch: &Watch) -> Result<Finished, Finished> {
     let start = Instant::now();
     let Some((key, record)) = shared.key(id) else {
         return Err(Finished::Failed(StepFailure::failed("started before its inputs were known")));
@@ -84,7 +84,7 @@ fn step_task(
     shared: &Shared<'_>,
     id: TaskId,
     step: &StepTask,
-    (account, watch, start): (&Account, &Watch, Instant),
+    (account, watch, start): (&Arc<Account>, &Watch, Instant),
 ) -> Result<Made, Finished> {
     let mut artifacts = Vec::new();
     for (name, input) in shared.plan.inputs(id) {
@@ -102,7 +102,11 @@ fn step_task(
     let inputs = inputs.with_measured(measured);
     shared.needs().check(shared.plan, id, &inputs).map_err(Finished::Failed)?;
     let limits = shared.plan.node(id).limits;
-    let work = || catch_unwind(AssertUnwindSafe(|| bounded(limits, account, watch, &|watch| step.run(&inputs, watch))));
+    let work = || {
+        catch_unwind(AssertUnwindSafe(|| {
+            bounded(limits, (account, &shared.clock), watch, &|watch| step.run(&inputs, watch))
+        }))
+    };
     let produced =
         shared.pool()?.install(work).unwrap_or_else(|payload| Err(Ended::Failed(panicked(payload.as_ref()))));
     let (produced, memory) = produced.map_err(|ended| match ended {
@@ -126,7 +130,7 @@ fn gate_task(
     shared: &Shared<'_>,
     id: TaskId,
     task: &GateTask,
-    (account, watch): (&Account, &Watch),
+    (account, watch): (&Arc<Account>, &Watch),
 ) -> Result<Made, Finished> {
     let (mut target, mut reference) = (None, None);
     for (name, input) in shared.plan.inputs(id) {
@@ -140,7 +144,8 @@ fn gate_task(
     let target = target.ok_or_else(|| Finished::Failed(StepFailure::failed("the gate has no mesh to check")))?;
     let _turn = target.turn();
     let work = |watch: &Watch| gate::evaluate(task, &target, reference.as_ref(), watch);
-    let work = || catch_unwind(AssertUnwindSafe(|| bounded(TaskLimits::default(), account, watch, &work)));
+    let work =
+        || catch_unwind(AssertUnwindSafe(|| bounded(TaskLimits::default(), (account, &shared.clock), watch, &work)));
     let report = shared.pool()?.install(work).unwrap_or_else(|payload| Err(Ended::Failed(panicked(payload.as_ref()))));
     let (report, memory) = report.map_err(|ended| match ended {
         Ended::Crowded => Finished::Crowded,

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
+use super::bounded::Clock;
 use super::ledger::Ledger;
 use super::names::Needs;
 use super::{RunError, RunOptions, source};
@@ -26,6 +27,7 @@ pub(super) struct Shared<'a> {
     pub(super) index: StatIndex,
     pub(super) options: &'a RunOptions,
     pub(super) ledger: Arc<Ledger>,
+    pub(super) clock: Clock,
     contents: Vec<OnceLock<ContentHash>>,
     slots: Vec<Mutex<Option<Slot>>>,
     reports: Vec<OnceLock<GateReport>>,
@@ -56,6 +58,7 @@ impl<'a> Shared<'a> {
             index: StatIndex::open(store),
             options,
             ledger: Arc::new(Ledger::new(options.meter)),
+            clock: Clock::default(),
             contents: (0..plan.len()).map(|_| OnceLock::new()).collect(),
             slots: (0..plan.len()).map(|_| Mutex::new(None)).collect(),
             reports: (0..plan.len()).map(|_| OnceLock::new()).collect(),
