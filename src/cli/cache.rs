@@ -99,7 +99,9 @@ impl LevelArgument {
             return Ok((0..count).collect());
         }
         let by_number = text.parse().ok().filter(|number| (1..=count).contains(number)).map(|number: usize| number - 1);
-        let by_name = || (0..count).find(|number| store.level_spec(*number).at == LevelSpec::parse(text).at);
+        // An address is one level, whatever else the settings say of it.
+        let named = LevelSpec::parse(text).name();
+        let by_name = || (0..count).find(|number| store.level_spec(*number).name() == named);
         by_number.or_else(by_name).map(|number| vec![number]).ok_or_else(|| {
             let names: Vec<String> =
                 (0..count).map(|number| format!("{} {}", number + 1, store.level_spec(number).name())).collect();

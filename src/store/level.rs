@@ -12,7 +12,7 @@ use tracing::{debug, warn};
 
 use super::StoreError;
 use super::folder::Folder;
-use super::place::{Kind, Place, Trouble};
+use super::place::{Kind, Place, RemoteSpec, Trouble};
 
 /// Where a level is, and what may be done there.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -30,19 +30,6 @@ pub enum Location {
     Folder(PathBuf),
     /// An object store.
     Remote(RemoteSpec),
-}
-
-/// An object store. What gives access to it stands in the environment and nowhere else.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct RemoteSpec {
-    /// Bucket and prefix: `s3://bucket/prefix`.
-    pub url: String,
-    /// Address of a server that is not Amazon's.
-    pub endpoint: Option<String>,
-    /// Region of the bucket.
-    pub region: Option<String>,
-    /// Whether the server may be spoken to without encryption.
-    pub allow_http: bool,
 }
 
 impl LevelSpec {
@@ -74,6 +61,9 @@ impl LevelSpec {
     pub(super) fn open(&self, first: bool) -> Result<Box<dyn Place>, StoreError> {
         match &self.at {
             Location::Folder(path) => Ok(Box::new(Folder::open(path, first)?)),
+            #[cfg(feature = "remote")]
+            Location::Remote(remote) => Ok(Box::new(super::remote::Bucket::open(remote)?)),
+            #[cfg(not(feature = "remote"))]
             Location::Remote(_) => {
                 let reason = "this program was built without the feature `remote`".to_owned();
                 Err(StoreError::Level { level: self.name(), reason })

@@ -20,8 +20,8 @@
 //!   when they are loaded, on every level. A missing or damaged blob or entry is a miss, never a wrong result.
 //! - An entry is published after its blob, in every level.
 //! - Two writers of one key write the same content, because steps are pure; the last rename wins and nothing changes.
-//! - A level in trouble is said once and passed over ([`level`]); only where no level takes a file is it an error.
-//! - What a folder promises by itself is said in [`folder`].
+//! - A level in trouble is said once and passed over (`level`); only where no level takes a file is it an error.
+//! - What a folder promises by itself is said in `folder`.
 //!
 //! Nothing is flushed to the disk by `fsync`: after a power cut a file may be empty or cut short, which the checks
 //! above find, and the result is computed again. Whoever may write to a shared level is trusted to run the same
@@ -37,6 +37,8 @@ mod level;
 mod pack;
 mod pin;
 mod place;
+#[cfg(feature = "remote")]
+mod remote;
 mod seal;
 pub mod stamp;
 pub mod stat_index;
@@ -56,8 +58,9 @@ use place::{Kind, Place};
 pub use clean::{CleanReport, GcLimits, StoreStat};
 pub use codec::{CODEC_VERSION, CodecError};
 pub use entry::{Entry, Figures, Outcome, Peak};
-pub use level::{LevelSpec, Location, RemoteSpec};
+pub use level::{LevelSpec, Location};
 pub use pin::Pin;
+pub use place::RemoteSpec;
 pub use seal::SealError;
 pub use stat_index::{StatIndex, host};
 pub use transfer::CopyReport;

@@ -8,6 +8,19 @@ use blake3::Hash;
 
 use super::StoreError;
 
+/// An object store. What gives access to it stands in the environment and nowhere else.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct RemoteSpec {
+    /// Bucket and prefix: `s3://bucket/prefix`.
+    pub url: String,
+    /// Address of a server that is not Amazon's.
+    pub endpoint: Option<String>,
+    /// Region of the bucket.
+    pub region: Option<String>,
+    /// Whether the server may be spoken to without encryption.
+    pub allow_http: bool,
+}
+
 /// What a file of the store holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {

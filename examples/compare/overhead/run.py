@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """What a runner costs: N trivial tasks, each one input file to one output file, with meshmill and its neighbours.
 
-    python3 examples/compare/overhead/run.py [--tasks 1000] [--limit 900] [--tools meshmill,ninja,snakemake,dvc]
+    python3 examples/compare/overhead/run.py [--tasks 1000] [--limit 900] [--tools meshmill,meshmill-shared,ninja,snakemake,dvc]
 
 The neighbours copy each file with `cp`; meshmill, which runs mesh steps and no commands, reads each file as a mesh,
 caches it and writes it out again. Each tool runs first on an empty state, then three times with nothing to do, and once
@@ -63,7 +63,13 @@ def dvc(folder, count, binary):
     return [binary, "repro", "-q"]
 
 
-TOOLS = {"meshmill": meshmill, "ninja": ninja, "snakemake": snakemake, "dvc": dvc}
+def shared(folder, count, binary):
+    """The same with a second level of the cache, as a lab has one (docs/shared-cache.md)."""
+    (folder / "lab").mkdir()
+    return meshmill(folder, count, binary) + ["--cache", "lab"]
+
+
+TOOLS = {"meshmill": meshmill, "meshmill-shared": shared, "ninja": ninja, "snakemake": snakemake, "dvc": dvc}
 
 
 def timed(command, folder, limit):
@@ -136,7 +142,7 @@ def main():
     print("| " + " | ".join(head) + " |")
     print("|" + "---|" * len(head))
     for name in arguments.tools.split(","):
-        binary = str(pathlib.Path(arguments.meshmill).resolve()) if name == "meshmill" else shutil.which(name)
+        binary = str(pathlib.Path(arguments.meshmill).resolve()) if name.startswith("meshmill") else shutil.which(name)
         if not binary or not pathlib.Path(binary).exists():
             print(f"| {name} | not installed | | | | | | |")
             continue
