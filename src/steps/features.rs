@@ -230,7 +230,7 @@ pub struct Step;
 
 impl StepContract for Step {
     const NAME: &'static str = "features";
-    const REVISION: u32 = 5;
+    const REVISION: u32 = 6;
     const INPUTS: &'static [InputDef] =
         &[InputDef { name: "from", accepts: &[Port::Surface], required: true, doc: "the surface to mark" }];
     const OUTPUTS: &'static [OutputDef] = &[OutputDef { name: "main", port: OutPort::Is(Port::Surface), derive: None }];

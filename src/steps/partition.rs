@@ -214,7 +214,7 @@ pub struct Step;
 
 impl StepContract for Step {
     const NAME: &'static str = "partition";
-    const REVISION: u32 = 1;
+    const REVISION: u32 = 2;
     const INPUTS: &'static [InputDef] =
         &[InputDef { name: "from", accepts: &[Port::Surface], required: true, doc: "the surface to cut into regions" }];
     const OUTPUTS: &'static [OutputDef] = &[OutputDef { name: "main", port: OutPort::Is(Port::Surface), derive: None }];

@@ -203,7 +203,7 @@ pub struct Step;
 
 impl StepContract for Step {
     const NAME: &'static str = "remove-features";
-    const REVISION: u32 = 10;
+    const REVISION: u32 = 11;
     const INPUTS: &'static [InputDef] = &[InputDef {
         name: "from",
         accepts: &[Port::Surface],

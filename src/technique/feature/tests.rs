@@ -136,3 +136,41 @@ fn of_two_curves_that_run_alongside_only_the_sharper_stays() {
     let features = marked.carried.marks.iter().filter(|(_, mark)| mark.cause == MarkCause::Feature);
     assert!(features.map(|(edge, _)| edge).all(left));
 }
+
+/// A cube whose edge from 0 to 1 has these points beside it on one side only, and these faces between them, numbered
+/// from 8. `under` fans the bottom from corner 3 over the points from 0 to 1.
+fn cube_with(beside: &[[f64; 3]], under: &[u32], between: &[[u32; 3]]) -> Surface {
+    let mut mesh = cube();
+    for &p in beside {
+        mesh.points.push(DVec3::from(p));
+    }
+    let is_bottom = |corners: &[VertexId; 3]| corners.map(VertexId::raw) == [0, 3, 1];
+    let others = mesh.faces.iter().filter(|corners| !is_bottom(corners)).copied();
+    let fan = under.windows(2).map(|pair| [pair[0], 3, pair[1]]).chain(between.iter().copied());
+    let faces: Vec<[VertexId; 3]> = others.chain(fan.map(|corners| corners.map(VertexId::from_raw))).collect();
+    Surface { points: mesh.points, faces: faces.into(), carried: crate::mesh::Carried::default() }
+}
+
+/// The other ends of curve edges at a vertex.
+fn along_curves(marked: &Surface, v: u32) -> Vec<u32> {
+    let edges = marked.carried.marks.keys().map(|edge| edge.map(VertexId::raw)).filter(|edge| edge.contains(&v));
+    edges.map(|[a, b]| if a == v { b } else { a }).collect()
+}
+
+#[test]
+fn a_curve_takes_the_way_through_a_corner_that_hardly_lies_beside_it() {
+    // The bottom ends at a point 4e-6 of the diagonal beside the edge, and a sliver closes the gap.
+    let mesh = cube_with(&[[0.5, 7e-6, 0.0]], &[0, 8, 1], &[[0, 8, 1]]);
+    let (marked, report) = find(&mesh, &RULES);
+    assert_eq!((report.sharp_edges, report.corners), (13, 8));
+    assert_eq!(along_curves(&marked, 8), [0, 1]);
+}
+
+#[test]
+fn slivers_folded_over_each_other_are_one() {
+    // The gap between the edge and a point on it is closed by three faces without area, about a point beyond its end.
+    let mesh = cube_with(&[[0.6, 0.0, 0.0], [-0.3, 0.0, 0.0]], &[0, 8, 1], &[[0, 9, 1], [0, 8, 9], [8, 1, 9]]);
+    let (marked, report) = find(&mesh, &RULES);
+    assert_eq!((report.sharp_edges, report.corners), (13, 8));
+    assert_eq!((along_curves(&marked, 8), along_curves(&marked, 9)), (vec![0, 1], vec![]));
+}
