@@ -1,7 +1,7 @@
 //! A cache of many: levels on folders that others share, with their rights, their limits, and what goes wrong there.
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 use predicates::prelude::*;
@@ -58,6 +58,14 @@ fn results(desk: &Desk, level: &str) -> u64 {
     let stat = desk.meshmill(&["cache", "stat", "--json", "--cache", level]).output().unwrap().stdout;
     let stat: serde_json::Value = serde_json::from_slice(&stat).unwrap();
     stat["levels"][0]["contents"]["entries"].as_u64().unwrap()
+}
+
+/// The files of a level's artifacts.
+fn artifacts(desk: &Desk, level: &str) -> Vec<PathBuf> {
+    let entries = |folder: PathBuf| fs::read_dir(folder).into_iter().flatten().map(|entry| entry.unwrap().path());
+    let mut files: Vec<PathBuf> = entries(desk.path(&format!("{level}/v2/cas"))).flat_map(entries).collect();
+    files.sort();
+    files
 }
 
 #[test]
@@ -173,6 +181,12 @@ fn levels_are_looked_after_one_by_one() {
     cache(&["gc", "--max-size", "0"]).assert().success();
     assert_eq!((results(&desk, "first"), results(&desk, "lab")), (0, made), "gc took more than the first level");
     cache(&["pull"]).assert().success().stdout(predicate::str::contains(format!("{made} results")));
+    // A level that was filled on the way has results whose meshes nobody has asked for: those come too.
+    let meshes = artifacts(&desk, "first");
+    assert!(!meshes.is_empty());
+    meshes.iter().for_each(|mesh| fs::remove_file(mesh).unwrap());
+    cache(&["pull"]).assert().success();
+    assert_eq!(artifacts(&desk, "first"), meshes);
     cache(&["clear", "--level", "2"]).assert().success();
     cache(&["push", "--level", "lab"]).assert().success().stdout(predicate::str::contains(format!("{made} results")));
     assert_eq!((results(&desk, "first"), results(&desk, "lab")), (made, made));

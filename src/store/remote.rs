@@ -62,7 +62,7 @@ impl Bucket {
     pub(super) fn open(spec: &RemoteSpec) -> Result<Self, StoreError> {
         let failed = |reason: String| StoreError::Level { level: spec.url.clone(), reason };
         let is_set = |name: &&str| env::var_os(name).is_some_and(|value| !value.is_empty());
-        if !ACCESS.iter().any(|name| is_set(name)) {
+        if !ACCESS.iter().any(is_set) {
             let reason = "the environment gives no access: AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY are not set";
             return Err(failed(reason.to_owned()));
         }

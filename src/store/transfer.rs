@@ -43,7 +43,8 @@ impl Store {
         let (known, mut blobs) = (hashes(target, Kind::Entry)?, hashes(target, Kind::Blob)?);
         let mut report = CopyReport::default();
         for item in source.list(Kind::Entry)? {
-            if known.contains(item.hash.as_bytes()) {
+            let is_known = known.contains(item.hash.as_bytes());
+            if is_known && !self.lacks_artifact(from.min(to), &item.hash, &blobs) {
                 report.present += 1;
             } else if !self.copy_one(from, target, &item.hash, (&mut blobs, &mut report))? {
                 if self.levels[from].place().is_none() {
@@ -61,6 +62,14 @@ impl Store {
             }
         }
         Ok(report)
+    }
+
+    /// Whether a result names an artifact that is not among `blobs`: a level that was filled on the way has results
+    /// whose artifacts nobody has asked for. `near` is the level that costs less to read.
+    fn lacks_artifact(&self, near: usize, key: &Hash, blobs: &BTreeSet<[u8; 32]>) -> bool {
+        let bytes = self.levels[near].read(Kind::Entry, key);
+        let entry = bytes.and_then(|bytes| Entry::decode(key, &bytes).ok());
+        entry.and_then(|entry| entry.content()).is_some_and(|content| !blobs.contains(content.as_bytes()))
     }
 
     /// Copies one result with its artifact. False where it is left out.
