@@ -309,7 +309,7 @@ pub struct Step;
 
 impl crate::step::Step for Step {
     const NAME: &'static str = "remesh";
-    const REVISION: u32 = 5;
+    const REVISION: u32 = 4;
     const INPUTS: &'static [InputDef] =
         &[InputDef { name: "from", accepts: &[Port::Surface], required: true, doc: "the surface to mesh anew" }];
     const OUTPUTS: &'static [OutputDef] = &[OutputDef { name: "main", port: OutPort::Is(Port::Surface), derive: None }];

@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use super::order::scattered;
 use super::smooth::worth;
-use super::work::{Care, Corners, HAS_NORMAL, Work, stretch};
+use super::work::{Care, Corners, Work, stretch};
 use crate::mesh::edit::{FlipPlan, check_flip, flip};
 use crate::mesh::geometry::area_vector;
 use crate::mesh::halfedge::{edge_of, halfedge_of, twin};
@@ -126,15 +126,9 @@ impl Work<'_> {
         sum(1) < sum(0)
     }
 
-    /// Whether a new face turns away from both old ones; one that has no normal does not count beside one that has.
+    /// Whether a new face turns away from both old ones.
     pub(super) fn turns(&self, old: [FaceId; 2], new: [Corners; 2]) -> bool {
-        let has_normal = old.map(|f| self.quality(f) >= HAS_NORMAL);
-        let counts = |place: usize| has_normal[place] || !has_normal[1 - place];
-        let normals = [0, 1].map(|place| {
-            let normal = area_vector(self.mesh.corner_points(old[place])).normalize_or_zero();
-            if counts(place) { normal } else { DVec3::ZERO }
-        });
-        let sum = normals[0] + normals[1];
+        let sum: DVec3 = old.iter().map(|&f| area_vector(self.mesh.corner_points(f)).normalize_or_zero()).sum();
         new.iter().any(|&corners| {
             let normal = area_vector(corners);
             normal.dot(sum) <= std::f64::consts::FRAC_1_SQRT_2 * normal.length() * sum.length()

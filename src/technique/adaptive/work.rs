@@ -14,7 +14,7 @@ use crate::technique::sizing::curvature::longest_chord;
 use crate::technique::sizing::{Bounds, Sizing};
 
 /// A face below this stretch has no normal to speak of.
-pub(super) const HAS_NORMAL: f64 = 0.02;
+const HAS_NORMAL: f64 = 0.02;
 /// New faces turn away from the old ones by less than 60 degrees.
 const LEAST_TURN_COSINE: f64 = 0.5;
 /// Samples of new faces lie within this part of the tolerance.
