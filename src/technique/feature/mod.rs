@@ -16,8 +16,9 @@
 //!
 //! Invariants: every corner ends a curve, no curve passes a corner; a second run on the result changes nothing.
 //! Faces without a reliable normal, being lower than a hundred-thousandth of the diagonal, take that of the neighbour
-//! over their longest side, several such at each other's longest sides together. Trap: a cylinder of `n` facets has edges of 360°/n; [`Report::facet_angle`] tells the usual
-//! angle between facets, and `angle` should be more than 1.5 times that. Cost: O(F log F).
+//! over their longest side, several such at each other's longest sides together. Trap: a cylinder of `n` facets has
+//! edges of 360°/n; [`Report::facet_angle`] tells the usual angle between facets, and `angle` should be more than 1.5
+//! times that. Cost: O(F log F).
 
 mod chains;
 mod corners;
