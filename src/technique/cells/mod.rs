@@ -57,8 +57,8 @@ const SIZE: Size = Size { large: 200_000, cell: 16_384 };
 /// Where cells are cut in two, in turn: the part of the vertices on the lower side.
 const SHARES: [f64; 2] = [0.5, 0.38];
 /// Cells are left with so many times the faces that are wanted in the end.
-const SPARE: f64 = 4.0;
-/// A round is worth its while where the faces become fewer by this factor.
+const SPARE: usize = 4;
+/// A round is worth its while where that leaves fewer faces by this factor.
 const MUCH: usize = 3;
 /// The part of a certified tolerance that cells may use up.
 const TOLERANCE: f64 = 0.5;
@@ -129,7 +129,7 @@ where
 {
     let is_worthwhile = |surface: &Surface| {
         let faces = surface.faces.len();
-        faces >= size.large && faces / MUCH >= task.faces && surface.carried.seams.is_empty()
+        faces >= size.large && faces / (MUCH * SPARE) >= task.faces && surface.carried.seams.is_empty()
     };
     let origin = Aabb::of(task.surface.points.iter().copied()).centre();
     let mut thinned: Option<Thinned> = None;
@@ -200,7 +200,7 @@ impl Round<'_> {
         }
         let inside: f64 = (0..part.inside).map(|f| triangle_area(part.surface.corners(FaceId::new(f)))).sum();
         let still = part.surface.faces.len() - part.inside;
-        let wanted = if area > 0.0 { SPARE * self.task.faces as f64 * inside / area } else { 0.0 };
+        let wanted = if area > 0.0 { (SPARE * self.task.faces) as f64 * inside / area } else { 0.0 };
         let goal = Goal { faces: still + wanted.ceil() as usize, ..Goal::default() };
         let freedom = resolve_freedom(&part.surface, &self.task.locks)?;
         let tree = reference_tree(setup.mode, &part.surface);
@@ -209,9 +209,7 @@ impl Round<'_> {
             let gathered = self.gathered.get(v.index()).copied().flatten()?;
             Some((VertexId::new(local), gathered))
         });
-        if !self.gathered.is_empty() {
-            guarded.take_over(self.origin, known);
-        }
+        guarded.take_over(self.origin, known);
         simplify(&mut guarded, self.task.rules, goal, watch)?;
         Ok(Done::new(guarded, part, &self.cutting, cell))
     }

@@ -76,7 +76,7 @@ fn thinned(surface: &Surface, mode: ToleranceMode, tolerance: f64) -> Thinned {
     };
     let setup = setup(mode, tolerance);
     let locks = LockRules::default();
-    let task = Task { surface, reference: surface, locks, setup: &setup, rules: &rules, faces: 600 };
+    let task = Task { surface, reference: surface, locks, setup: &setup, rules: &rules, faces: 200 };
     thin_by::<Error>(SMALL, &task, &Watch::silent()).unwrap().expect("large enough")
 }
 

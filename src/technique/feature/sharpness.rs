@@ -95,7 +95,9 @@ fn slivers(surface: &Surface, edges: &EdgeTable, normals: &IdVec<Face, Option<DV
         slivers[*known].faces.push(f);
         slivers[*known].sides.extend(of_face[f]);
     }
-    slivers.iter_mut().for_each(|sliver| longest_first(&mut sliver.sides));
+    for sliver in &mut slivers {
+        longest_first(&mut sliver.sides);
+    }
     slivers
 }
 

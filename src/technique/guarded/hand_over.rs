@@ -12,9 +12,11 @@ impl GuardedMesh<'_> {
         Gathered { planes: *self.quadrics.planes(v), lines: self.quadrics.lines(v) }
     }
 
-    /// Begins the quadrics anew about `origin`, and then with what these vertices had gathered elsewhere.
+    /// Goes on with what these vertices had gathered elsewhere, about `origin`; others begin with their faces.
     pub fn take_over(&mut self, origin: DVec3, known: impl Iterator<Item = (VertexId, Gathered)>) {
-        self.quadrics.begin(&self.mesh, origin);
+        if self.quadrics.origin != origin {
+            self.quadrics.begin(&self.mesh, origin);
+        }
         for (v, gathered) in known {
             self.quadrics.set(v, gathered);
         }

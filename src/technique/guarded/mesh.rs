@@ -87,11 +87,18 @@ pub struct GuardedMesh<'a> {
 }
 
 impl<'a> GuardedMesh<'a> {
-    /// A mesh under guard. `feature_weight` is the weight of the sharpest marked edges in the quadrics.
-    pub(super) fn new(mesh: HalfedgeMesh, keeper: Keeper<'a>, limits: Limits, feature_weight: f64) -> Self {
+    /// A mesh under guard. `feature_weight` is the weight of the sharpest marked edges in the quadrics; `pen` is that of
+    /// a part of a larger mesh.
+    pub(super) fn new(
+        mesh: HalfedgeMesh,
+        keeper: Keeper<'a>,
+        limits: Limits,
+        feature_weight: f64,
+        pen: Option<Pen>,
+    ) -> Self {
         let mut this = Self {
             collision: Collision::new(&mesh),
-            quadrics: Quadrics::new(&mesh, feature_weight),
+            quadrics: Quadrics::new(&mesh, feature_weight, pen.as_ref().map(|pen| pen.origin)),
             shapes: vec![Shape::default(); mesh.face_slots()],
             mesh,
             keeper,
@@ -101,7 +108,7 @@ impl<'a> GuardedMesh<'a> {
             star: Star::default(),
             recorder: None,
             ties: Ties::default(),
-            pen: None,
+            pen,
             age: 0,
         };
         let faces: Vec<FaceId> = this.mesh.faces().collect();

@@ -55,6 +55,17 @@ pub fn open<'a>(
     tree: &'a TriangleBvh,
     setup: Setup,
 ) -> Result<GuardedMesh<'a>, EnterError> {
+    opened(surface, freedom, reference, tree, setup, None)
+}
+
+fn opened<'a>(
+    surface: &Surface,
+    freedom: &ResolvedFreedom,
+    reference: &'a Surface,
+    tree: &'a TriangleBvh,
+    setup: Setup,
+    pen: Option<Pen>,
+) -> Result<GuardedMesh<'a>, EnterError> {
     let mut mesh = HalfedgeMesh::new(surface, freedom)?;
     if setup.may_merge_corners
         && let Some(loosened) = free_close_corners(&mesh, freedom, setup.feature_tolerance)
@@ -72,7 +83,7 @@ pub fn open<'a>(
             Keeper::Distance { envelope: Box::new(envelope), curves }
         }
     };
-    Ok(GuardedMesh::new(mesh, keeper, setup.limits, setup.feature_weight))
+    Ok(GuardedMesh::new(mesh, keeper, setup.limits, setup.feature_weight, pen))
 }
 
 /// Opens a guarded mesh on a part of a larger surface, held against itself, in a pen; `tree` is [`reference_tree`].
@@ -87,20 +98,19 @@ pub fn open_part<'a>(
     pen: Pen,
 ) -> Result<GuardedMesh<'a>, EnterError> {
     let reach = setup.feature_tolerance;
-    let mut guarded = open(part, freedom, part, tree, setup)?;
-    if let Keeper::Distance { curves, .. } = &mut guarded.keeper {
+    let mut guarded = opened(part, freedom, part, tree, setup, Some(pen))?;
+    let GuardedMesh { mesh, pen, keeper, .. } = &mut guarded;
+    if let Keeper::Distance { curves, .. } = keeper {
         // Where the part was cut out is no rim.
-        let mesh = &guarded.mesh;
+        let is_fixed = |f| pen.as_ref().is_some_and(|pen| pen.is_fixed(f));
         let is_cut = |e| {
             let h = halfedge_of(e);
             let faces = [mesh.face(h), mesh.face(twin(h))];
-            mesh.is_boundary_edge(e) && faces.into_iter().flatten().all(|f| pen.is_fixed(f))
+            mesh.is_boundary_edge(e) && faces.into_iter().flatten().all(is_fixed)
         };
         let edges = mesh.edges().filter(|&e| mesh.edge_freedom(e) != Freedom::Free && !is_cut(e));
         *curves = Curves::new(edges.map(|e| mesh.ends(e).map(|v| mesh.point(v))).collect(), reach);
     }
-    guarded.take_over(pen.origin, std::iter::empty());
-    guarded.pen = Some(pen);
     Ok(guarded)
 }
 

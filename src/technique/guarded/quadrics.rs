@@ -34,10 +34,14 @@ pub(super) struct Quadrics {
 }
 
 impl Quadrics {
-    /// The quadrics of a fresh mesh. `feature_weight` is the weight of the sharpest marked edges.
-    pub(super) fn new(mesh: &HalfedgeMesh, feature_weight: f64) -> Self {
-        let bounds = Aabb::of(mesh.vertices().map(|v| mesh.point(v)));
-        let origin = if bounds.is_empty() { DVec3::ZERO } else { bounds.centre() };
+    /// The quadrics of a fresh mesh, about its middle or another origin. `feature_weight` is the weight of the sharpest
+    /// marked edges.
+    pub(super) fn new(mesh: &HalfedgeMesh, feature_weight: f64, origin: Option<DVec3>) -> Self {
+        let middle = || {
+            let bounds = Aabb::of(mesh.vertices().map(|v| mesh.point(v)));
+            if bounds.is_empty() { DVec3::ZERO } else { bounds.centre() }
+        };
+        let origin = origin.unwrap_or_else(middle);
         let mut this = Self { feature_weight, ..Self::default() };
         this.begin(mesh, origin);
         this

@@ -134,7 +134,7 @@ mod tests {
         let mesh = enter(&surface(&[&low[..], &ceiling].concat(), &[[0, 1, 2], [1, 0, 3], [4, 5, 6]]));
         let shared = mesh.edges().find(|&e| !mesh.is_boundary_edge(e)).expect("the two faces share an edge");
         let limits = Limits { min_stretch: 0.0, max_size: SizeField::Uniform(f64::INFINITY), max_valence: 9 };
-        let mut guarded = GuardedMesh::new(mesh, Keeper::QuadricRms { most: 1.0 }, limits, 1.0);
+        let mut guarded = GuardedMesh::new(mesh, Keeper::QuadricRms { most: 1.0 }, limits, 1.0, None);
         guarded.split(shared, DVec3::new(0.5, 0.0, 1e-13))
     }
 

@@ -159,7 +159,7 @@ mod tests {
         let keep = ["kept".to_owned()];
         let freedom = resolve_freedom(&joint, &LockRules { keep: &keep, ..LockRules::default() }).expect("a lock");
         let mesh = HalfedgeMesh::new(&joint, &freedom).expect("a surface");
-        let mut guarded = GuardedMesh::new(mesh, Keeper::QuadricRms { most: 1.0 }, limits(), 1.0);
+        let mut guarded = GuardedMesh::new(mesh, Keeper::QuadricRms { most: 1.0 }, limits(), 1.0, None);
         assert_eq!(guarded.tie_seams(), 0);
     }
 }
