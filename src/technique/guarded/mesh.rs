@@ -87,8 +87,8 @@ pub struct GuardedMesh<'a> {
 }
 
 impl<'a> GuardedMesh<'a> {
-    /// A mesh under guard. `feature_weight` is the weight of the sharpest marked edges in the quadrics; `pen` is that of
-    /// a part of a larger mesh.
+    /// A mesh under guard. `feature_weight` is the weight of the sharpest marked edges in the quadrics; `pen` is that
+    /// of a part of a larger mesh.
     pub(super) fn new(
         mesh: HalfedgeMesh,
         keeper: Keeper<'a>,
